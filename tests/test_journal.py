@@ -493,7 +493,7 @@ def test_a_plan_that_cannot_be_kept(changes, says):
     [
         ({"bearing.radial_clearance": "8 mm"}, "a tenth of the bore"),
         ({"bearing.scar_depth": "0.3 mm"}, "must be < the radial clearance"),
-        ({"bearing.scar_depth": "0.1 mm"}, "film.rung = 'map' knows a plain bore only"),
+        ({"bearing.scar_depth": "0.1 mm"}, "film.rung = 'map' needs a plain bore"),
         ({"bearing.scar_share": 0.5}, "scar_share = 0.5 needs unworn_clearance"),
         (
             {"bearing.scar_share": 0.5, "bearing.unworn_clearance": "0.1 mm"},

@@ -85,13 +85,13 @@ def test_rungs_are_tabulated_from_the_cheapest():
         ("triplex-pump", {}, "pressure", "heads", "suction_line is missing"),
         ("bilge-pump", {"joint.crankpin.diametral_clearance": 0}, "crankpin", "link", "clearance"),
         ("bilge-pump", {"drive.speed": "900 rpm"}, "pressure", "heads", "vapour"),
-        ("propulsion-shaft", {}, "film", "map", "knows no tilted journal"),
+        ("propulsion-shaft", {}, "film", "map", "is for an aligned journal"),
         (
             "journal-bearing",
             {"bearing.scar_depth": "5 um", "film.rung": "direct"},
             "film",
             "short",
-            "plain bore only",
+            "needs a plain bore",
         ),
         ("propulsion-shaft", {}, "elements", "x2", "half a bending wave"),
         (

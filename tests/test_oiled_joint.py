@@ -473,7 +473,7 @@ def test_what_an_oiled_rung_lacks_is_named():
         load_scene("bilge-pump", {"joint.crankpin.rung": "film-map"})
     with pytest.raises(SceneError, match=r"oil.roughness is missing; the rung 'mixed' needs it"):
         pump("mixed", **{"joint.crankpin.oil": {"viscosity": 0.1, "length": 0.05}})
-    with pytest.raises(SceneError, match="a map is of a flooded film"):
+    with pytest.raises(SceneError, match="a map describes a flooded film"):
         pump("film-map", **{"joint.crankpin.oil.filled_gap": "10 um"})
     with pytest.raises(SceneError, match="it leaves two lands"):
         pump("film-short", **{"joint.crankpin.oil.groove_width": "20 mm"})

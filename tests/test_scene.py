@@ -279,7 +279,7 @@ def test_unknown_scene_and_machine_name_the_nearest():
                 f"{CRANKPIN}.restitution_speed": 0.3,
                 f"{CRANKPIN}.speed_floor": 0.1,
             },
-            "speed_floor = 0.1 m/s has no use with restitution_speed",
+            "speed_floor = 0.1 m/s has no effect with restitution_speed",
         ),
         ({"rod.mass": math.inf}, "rod.mass = inf kg"),
         ({"rod.mass": "1e999 kg"}, "rod.mass = inf kg"),
@@ -402,7 +402,7 @@ def test_what_divides_has_a_least_value(path):
 def test_a_number_out_of_bounds_comes_with_a_cure():
     [fault] = faults_of({"rod.mass": "3e9 kg"})
     assert fault == (
-        "rod.mass = 3e+09 kg must be <= 1e+06 (with its bearing shells); check value and unit"
+        "rod.mass = 3e+09 kg must be <= 1e+06 (mass with bearing shells); check value and unit"
     )
 
 

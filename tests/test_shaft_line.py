@@ -93,7 +93,7 @@ def line_of(row, scene, order):
         ({"turbulence.1.place": "hull"}, "turbulence.1.place = 'hull' is no bearing and no disc"),
         (
             {"film.rung": "map"},
-            "film.rung = 'map' knows no tilted journal; set film.rung = 'direct'",
+            "film.rung = 'map' is for an aligned journal; set film.rung = 'direct'",
         ),
         (
             {"film.condition": "reynolds"},

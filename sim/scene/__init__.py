@@ -1,4 +1,4 @@
-"""What the machine is: validated scenes without physics, built-in scenes, rungs, plausibility.
+"""Validated scenes without physics, built-in scenes, rungs and plausibility checks.
 
 It may import ``sim.brief``, ``sim.output``, ``sim.parts``.
 """

@@ -1,7 +1,7 @@
-"""A shaker or an instrumented hammer of a scene: how it pushes, and what its force cell reads.
+"""Shaker or instrumented hammer of a scene: its force, and what its force cell reads.
 
-Where it pushes is of the machine: :mod:`.scene.shaft`, :mod:`.scene.pump`. The force itself is made
-in :mod:`.excitation.forces`.
+Its point of application belongs to the machine: :mod:`.scene.shaft`, :mod:`.scene.pump`. The force
+signal is made in :mod:`.excitation.forces`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ _RANGE_LEAST = 1e-6  # N
 _FREQUENCY_MOST = 1e6  # Hz
 _LONGEST = 3600.0  # s
 _MOST_REPEATS = 10_000
-_SCATTER_MOST = 0.5  # of the logarithm of a peak, or rad: beyond it nobody calls it a hammer test
+_SCATTER_MOST = 0.5  # of the logarithm of a peak, or rad: a larger scatter is no hammer test
 
 Kind = Literal["random", "burst-random", "sweep", "stepped-sine", "hammer"]
 
@@ -28,32 +28,39 @@ class Exciter(Part):
     """A shaker or a hammer; with ``force = 0`` it is not mounted and has no channel.
 
     ``repeats`` are spread evenly over the recording after ``quiet``: bursts, sweeps, frequencies of
-    a stepped sine, blows. The force is what acts on the machine: that a shaker gives less at a
-    resonance is not modelled, and need not be, since the cell reads what acts.
+    a stepped sine, blows. The force is what acts on the machine. That a shaker delivers less at a
+    resonance is not modelled and need not be, since the cell reads the acting force.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)] = Field(
-        default="force", description="of the force cell's channel"
+        default="force", description="name of the force cell's channel"
     )
-    kind: Kind = Field(default="random", description="waveform of its force")
+    kind: Kind = Field(default="random", description="waveform of the force")
     force: Force = Field(
-        default=0.0, ge=0, le=FORCE_MOST, description="rms while it pushes; hammer: median peak"
+        default=0.0, ge=0, le=FORCE_MOST, description="rms while active; hammer: median peak"
     )
-    low: Frequency = Field(default=5.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
-    high: Frequency = Field(default=400.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
-    quiet: Time = Field(default=0.0, ge=0, le=_LONGEST, description="before it begins to push")
+    low: Frequency = Field(
+        default=5.0, gt=0, le=_FREQUENCY_MOST, description="lower end of the band"
+    )
+    high: Frequency = Field(
+        default=400.0, gt=0, le=_FREQUENCY_MOST, description="upper end of the band"
+    )
+    quiet: Time = Field(default=0.0, ge=0, le=_LONGEST, description="pause before the force begins")
     repeats: int = Field(
         default=20, ge=1, le=_MOST_REPEATS, description="blows or periods in a recording"
     )
-    share: Ratio = Field(default=0.6, gt=0, le=1, description="of a burst or sweep that it pushes")
+    share: Ratio = Field(default=0.6, gt=0, le=1, description="active share of a burst or sweep")
     contact_time: Time = Field(
-        default=2.5e-3, gt=0, le=1.0, description="of a blow's half-sine, set by the hammer's tip"
+        default=2.5e-3, gt=0, le=1.0, description="duration of a blow's half-sine, set by the tip"
     )
     peak_scatter: Ratio = Field(
-        default=0.2, ge=0, le=_SCATTER_MOST, description="of the logarithm of the blows' peaks"
+        default=0.2,
+        ge=0,
+        le=_SCATTER_MOST,
+        description="scatter of the logarithm of the blows' peaks",
     )
     angle_scatter: Angle = Field(
-        default=0.0, ge=0, le=_SCATTER_MOST, description="of the blows' direction"
+        default=0.0, ge=0, le=_SCATTER_MOST, description="scatter of the blows' direction"
     )
     double_hits: Ratio = Field(default=0.0, ge=0, le=1, description="share of blows that rebound")
     gain: Ratio = Field(
@@ -63,7 +70,7 @@ class Exciter(Part):
     range: Force = Field(
         ge=_RANGE_LEAST, le=FORCE_MOST, description="full scale of the cell, plus and minus"
     )
-    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
 
     @model_validator(mode="after")
     def _band(self) -> Self:
@@ -76,17 +83,17 @@ class Exciter(Part):
 
     @property
     def mounted(self) -> bool:
-        """Whether it pushes and is recorded."""
+        """Whether it acts and is recorded."""
         return self.force > 0
 
 
 class CasingExciter(Exciter):
-    """A shaker or hammer on the casing of a pump, which is known in one direction at each place."""
+    """A shaker or hammer on the casing of a pump, whose modes have one direction at each place."""
 
     place: Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)] = Field(
-        description="of the mode shapes: of a force, or of a sensor that is pushed"
+        description="place in the mode shapes: of a force or a sensor"
     )
-    direction: str = Field(default="", description="which way it pushes, for the report")
+    direction: str = Field(default="", description="direction of the force, for the report")
 
     @model_validator(mode="after")
     def _straight(self) -> Self:
@@ -99,15 +106,15 @@ class CasingExciter(Exciter):
 
 
 class PlacedExciter(Exciter):
-    """An exciter on a shaft, whose blows scatter along it as well."""
+    """An exciter on a shaft, whose blows also scatter along the shaft."""
 
     place_scatter: Length = Field(
-        default=0.0, ge=0, le=1.0, description="of the blows along the shaft"
+        default=0.0, ge=0, le=1.0, description="scatter of the blows along the shaft"
     )
 
 
 def force_channel(part: Exciter, place: str, direction: str) -> Channel:
-    """Channel of the force cell: what acts where, and which way.
+    """Channel of the force cell, named by place and direction.
 
     Examples
     --------
@@ -118,7 +125,7 @@ def force_channel(part: Exciter, place: str, direction: str) -> Channel:
 
 
 def pushing_faults(scene: Scene, exciters: Sequence[Exciter]) -> list[str]:
-    """What of a scene's exciters does not go with its recording, as :func:`exciter_faults`."""
+    """Faults of all exciters of a scene, by :func:`exciter_faults`."""
     times = {"duration": scene.duration, "sample_rate": scene.sample_rate}
     return [
         fault
@@ -130,17 +137,17 @@ def pushing_faults(scene: Scene, exciters: Sequence[Exciter]) -> list[str]:
 def exciter_faults(
     path: str, part: Exciter, *, duration: float, sample_rate: float
 ) -> Iterator[str]:
-    """What of an exciter does not go with the recording, as sentences; none where not mounted.
+    """Conflicts of an exciter with the recording, as sentences; none if it is not mounted.
 
     Parameters
     ----------
     path : str
-        Its dotted path in the scene.
+        Dotted path of the exciter in the scene.
     part : Exciter
     duration : float
-        Of the recording [s].
+        Length of the recording [s].
     sample_rate : float
-        [Hz]
+        Sampling rate [Hz].
 
     Examples
     --------
@@ -182,7 +189,7 @@ def _blow_faults(path: str, part: Exciter, stretch: float, sample_rate: float) -
 
 def _burst_faults(path: str, part: Exciter, stretch: float) -> Iterator[str]:
     stepped = part.kind == "stepped-sine"
-    # settled halves of the dwells hold whole periods, their frequencies are apart by one of them
+    # the settled half of a dwell holds whole periods, so frequencies differ by one per half or more
     turns = (part.high - part.low) * stretch / 2 if stepped else part.low * part.share * stretch
     least = part.repeats - 1 if stepped else 1
     if turns < least:

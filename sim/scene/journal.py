@@ -1,4 +1,4 @@
-"""The parts of a journal bearing with its rotor and its proximity probes, and their cross checks.
+"""Parts of a journal bearing with its rotor and its proximity probes, and their cross checks.
 
 X points along the load, and gravity acts along it; angles turn from X in the direction in which
 the shaft rotates, so that Y lies a quarter of a turn ahead of X.
@@ -62,9 +62,9 @@ from .scene import (
 )
 
 _UNBALANCE_MOST = 1e6  # kg m
-_THINNEST = 1e-9  # m, of a clearance: no film is thinner than its molecules
+_THINNEST = 1e-9  # m, smallest clearance: no film is thinner than its molecules
 _GAP_LEAST, _GAP_MOST = 1e-9, 1.0  # m
-_DEEPEST_SCAR = 0.2  # of the clearance across it: half of the round bore's radial clearance
+_DEEPEST_SCAR = 0.2  # of the diametral clearance: half of the round bore's radial clearance
 _MOST_GROOVES = 32
 _MOST_RUN_OUT = 64
 
@@ -72,39 +72,45 @@ _SHAFT_ANGLE = Annotated[Angle, Field(ge=-ANGLE_MOST, le=ANGLE_MOST)]
 
 
 class JournalDrive(Part):
-    """How the shaft is turned."""
+    """Drive of the shaft."""
 
-    speed: RotationSpeed = Field(gt=0, le=10_000, description="constant")
+    speed: RotationSpeed = Field(gt=0, le=10_000, description="shaft speed, constant")
     start_angle: _SHAFT_ANGLE = Field(default=0.0, description="shaft angle at the first sample")
 
 
 class AxialGroove(Part):
     """A groove along the bearing, centred in its length, full of oil."""
 
-    angle: _SHAFT_ANGLE = Field(description="of its middle")
+    angle: _SHAFT_ANGLE = Field(description="position of its middle")
     width: Angle = Field(gt=0, lt=math.tau, description="along the circumference")
-    length_share: Ratio = Field(default=0.8, gt=0, le=1, description="of the bearing's length")
+    length_share: Ratio = Field(
+        default=0.8, gt=0, le=1, description="share of the bearing's length"
+    )
     pressure: Pressure = Field(
-        default=0.0, ge=0, le=PRESSURE_MOST, description="of the feed, gauge"
+        default=0.0, ge=0, le=PRESSURE_MOST, description="feed pressure, gauge"
     )
 
 
 class ShellContact(Part):
     """Contact of journal and shell where the film ends, after Kelvin and Voigt."""
 
-    stiffness: Stiffness = Field(gt=0, le=STIFFEST, description="of shell and journal in series")
-    damping: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST, description="along the normal")
+    stiffness: Stiffness = Field(
+        gt=0, le=STIFFEST, description="stiffness of shell and journal in series"
+    )
+    damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="damping along the normal"
+    )
     friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
     friction_speed: Velocity = Field(
-        default=0.01, ge=SLIDING_LEAST, le=SLIDING_MOST, description="full friction from about here"
+        default=0.01, ge=SLIDING_LEAST, le=SLIDING_MOST, description="speed of nearly full friction"
     )
 
 
 class Bearing(Part):
     """The shell. Give exactly one of the two clearances."""
 
-    diameter: Length = Field(gt=0, le=LONGEST, description="of the bore")
-    length: Length = Field(gt=0, le=LONGEST, description="along the shaft")
+    diameter: Length = Field(gt=0, le=LONGEST, description="bore diameter")
+    length: Length = Field(gt=0, le=LONGEST, description="length along the shaft")
     diametral_clearance: Length | None = Field(
         default=None, ge=_THINNEST, description="bore minus journal diameter"
     )
@@ -114,12 +120,12 @@ class Bearing(Part):
     scar_depth: Length = Field(
         default=0.0, ge=0, description="deepest wear of the bore, where the shaft rubs at run-up"
     )
-    scar_angle: _SHAFT_ANGLE = Field(default=0.0, description="of the deepest wear")
+    scar_angle: _SHAFT_ANGLE = Field(default=0.0, description="position of the deepest wear")
     scar_share: Ratio = Field(
-        default=0.0, ge=0, le=1, description="of the wear since new: in a scar, not a wider circle"
+        default=0.0, ge=0, le=1, description="share of the wear since new that is a scar"
     )
     unworn_clearance: Length | None = Field(
-        default=None, ge=_THINNEST, description="diametral, as new; scar_share needs it"
+        default=None, ge=_THINNEST, description="diametral clearance as new; needed by scar_share"
     )
     grooves: tuple[AxialGroove, ...] = Field(
         default=(), max_length=_MOST_GROOVES, description="axial oil grooves; none: a plain bore"
@@ -128,10 +134,10 @@ class Bearing(Part):
         default=1.0,
         gt=0,
         le=1,
-        description="share of the widest gap that the oil brought in fills; 1: all the film needs",
+        description="share of the widest gap filled by the oil supply; 1: flooded",
     )
     wall: ShellContact | None = Field(
-        default=None, description="contact law; none: a touch ends the run"
+        default=None, description="contact law; none: contact ends the run"
     )
 
     @model_validator(mode="after")
@@ -149,18 +155,18 @@ class Bearing(Part):
         if self.clearance_diametral >= self.diameter / 10:
             raise ValueError(
                 f"{given[0]} = {getattr(self, given[0]):g} m must be < a tenth of the bore "
-                f"(diameter = {self.diameter:g} m), the film theory knows no curvature; check the "
+                f"(diameter = {self.diameter:g} m), the film theory neglects curvature; check the "
                 "unit"
             )
         if self.scar_share > 0 and (self.unworn_clearance is None or self.scar_depth > 0):
             raise ValueError(
                 f"scar_share = {self.scar_share:g} needs unworn_clearance, and no scar_depth "
-                "beside it; give the clearance of the new bearing and one of the two"
+                "with it; give the clearance of the new bearing and one of the two"
             )
         if self.scar_depth >= self.clearance_radial:
             raise ValueError(
                 f"scar_depth = {self.scar_depth:g} m must be < the radial clearance = "
-                f"{self.clearance_radial:g} m; a deeper scar is a bearing of its own"
+                f"{self.clearance_radial:g} m; deeper scars are outside the model"
             )
         return self
 
@@ -171,9 +177,9 @@ class Bearing(Part):
 
     @property
     def clearance_diametral(self) -> float:
-        """Diametral clearance [m], whichever way it was given.
+        """Diametral clearance [m], whether given as diametral or radial.
 
-        With a ``scar_share`` it is what a lift of the shaft or a lead wire shows across the scar.
+        With a ``scar_share`` it is what a shaft lift or a lead wire measures across the scar.
         """
         if self.radial_clearance is not None:
             return 2 * self.radial_clearance
@@ -181,7 +187,7 @@ class Bearing(Part):
 
     @property
     def scar(self) -> float:
-        """Depth of the scar below the round bore [m], whichever way it was given."""
+        """Depth of the scar below the round bore [m], given directly or by ``scar_share``."""
         return self.scar_depth or self._scar_by_share
 
     @property
@@ -193,78 +199,85 @@ class Bearing(Part):
 
 
 class RunOut(Part):
-    """One harmonic of what the probes see of a perfectly still shaft: shape and magnetism."""
+    """One harmonic of the run-out that the probes read: shape and magnetism of the track."""
 
     order: int = Field(ge=1, le=1000, description="cycles per revolution")
-    amplitude: Length = Field(ge=0, le=_GAP_MOST, description="of this harmonic")
-    phase: _SHAFT_ANGLE = Field(default=0.0, description="of the track, at the keyphasor mark")
+    amplitude: Length = Field(ge=0, le=_GAP_MOST, description="amplitude of this harmonic")
+    phase: _SHAFT_ANGLE = Field(default=0.0, description="phase at the keyphasor mark")
 
 
 class Dent(Part):
-    """A dent, scratch or keyway end of the track that the probes look at.
+    """A dent, scratch or keyway end in the probes' track.
 
-    Below the size of a probe's tip it is read as wide as the tip, and less deep.
+    If it is narrower than a probe's tip, it reads as wide as the tip and less deep.
     """
 
-    depth: Length = Field(ge=0, le=_GAP_MOST, description="in its middle, as a probe reads it")
-    width: Angle = Field(gt=0, le=2 * math.pi, description="from edge to edge")
+    depth: Length = Field(
+        ge=0, le=_GAP_MOST, description="depth in the middle, as a probe reads it"
+    )
+    width: Angle = Field(gt=0, le=2 * math.pi, description="width from edge to edge")
     angle: _SHAFT_ANGLE = Field(
-        default=0.0, description="from the keyphasor mark, in the direction of rotation"
+        default=0.0, description="position from the keyphasor mark, in the direction of rotation"
     )
 
 
 class RotorShare(Part):
-    """The part of a rigid rotor that one bearing carries."""
+    """Share of a rigid rotor carried by one bearing."""
 
-    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="on this bearing")
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="mass carried by this bearing")
     unbalance: Unbalance = Field(
-        default=0.0, ge=0, le=_UNBALANCE_MOST, description="mass times eccentricity, its share"
+        default=0.0,
+        ge=0,
+        le=_UNBALANCE_MOST,
+        description="mass times eccentricity, this bearing's share",
     )
     unbalance_angle: _SHAFT_ANGLE = Field(
-        default=0.0, description="from the keyphasor mark, in the direction of rotation"
+        default=0.0, description="position from the keyphasor mark, in the direction of rotation"
     )
     run_out: tuple[RunOut, ...] = Field(default=(), max_length=_MOST_RUN_OUT)
     dents: tuple[Dent, ...] = Field(default=(), max_length=_MOST_RUN_OUT)
 
 
 class LoadRecord(Part):
-    """A load against time from a CSV file: columns time [s], along X [N], along Y [N].
+    """Load over time from a CSV file: columns time [s], along X [N], along Y [N].
 
-    ``folder`` is where a relative file is looked for first, that of the scene file.
+    A relative file is searched first in ``folder``, that of the scene file.
     """
 
     file: str = Field(min_length=1, description="CSV: time [s], force along X and Y [N]")
-    folder: str = Field(default="", exclude=True, description="where the file is looked for first")
+    folder: str = Field(default="", exclude=True, description="folder searched first")
 
 
 class LoadOrder(Part):
-    """A force that repeats with the shaft: belt, coupling, gear mesh, vanes."""
+    """A force that repeats with the shaft rotation: belt, coupling, gear mesh, vanes."""
 
-    order: Ratio = Field(gt=0, le=1000, description="cycles per revolution; of a belt below 1")
-    amplitude: Force = Field(ge=0, le=FORCE_MOST, description="peak")
-    angle: _SHAFT_ANGLE = Field(default=0.0, description="direction, from X")
+    order: Ratio = Field(gt=0, le=1000, description="cycles per revolution; below 1 for a belt")
+    amplitude: Force = Field(ge=0, le=FORCE_MOST, description="peak force")
+    angle: _SHAFT_ANGLE = Field(default=0.0, description="direction from X")
     phase: _SHAFT_ANGLE = Field(
-        default=0.0, description="of its peak, in its own cycle from the keyphasor mark on"
+        default=0.0, description="phase of its peak in its own cycle, from the keyphasor mark"
     )
 
 
 class JournalLoad(Part):
-    """What pushes on the shaft besides its weight; times count from the first sample."""
+    """Loads on the shaft in addition to its weight; times count from the first sample."""
 
-    static: Force = Field(default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="along X")
-    static_across: Force = Field(default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="on Y")
+    static: Force = Field(
+        default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="steady force along X"
+    )
+    static_across: Force = Field(default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="along Y")
     history: Literal["none", "step", "rectangular", "half-sine", "file"] = Field(
-        default="none", description="how the load varies in time; file: as a record"
+        default="none", description="load over time; file: from a record"
     )
     amplitude: Force = Field(
         default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="peak of the load history"
     )
-    angle: _SHAFT_ANGLE = Field(default=0.0, description="direction of the history, from X")
-    begin: Time = Field(default=0.0, ge=0, description="of step or pulse")
-    length: Time | None = Field(default=None, gt=0, description="of the pulse")
+    angle: _SHAFT_ANGLE = Field(default=0.0, description="direction of the history from X")
+    begin: Time = Field(default=0.0, ge=0, description="start of step or pulse")
+    length: Time | None = Field(default=None, gt=0, description="duration of the pulse")
     record: LoadRecord | None = None
     orders: tuple[LoadOrder, ...] = Field(
-        default=(), max_length=_MOST_RUN_OUT, description="forces that repeat with the shaft"
+        default=(), max_length=_MOST_RUN_OUT, description="forces periodic with the shaft"
     )
 
     @model_validator(mode="after")
@@ -285,14 +298,14 @@ class JournalLoad(Part):
 
 
 class Film(Part):
-    """How the oil film is computed: in closed form, from a table of solves, or anew each time."""
+    """Model of the oil film: closed form, table of solves, or a solve at every step."""
 
     rung: Literal["short", "map", "direct"] = Field(
         default="map",
         description="short: closed form; map: table of solves; direct: solved at every step",
     )
     condition: Literal["guembel", "reynolds", "periodic"] = Field(
-        default="periodic", description="of cavitation, of the rungs map and direct"
+        default="periodic", description="cavitation condition of the rungs map and direct"
     )
     n_theta: int = Field(default=72, ge=12, le=1440, description="nodes round the circle")
     n_z: int = Field(default=17, ge=5, le=257, description="nodes over the length, odd")
@@ -300,15 +313,19 @@ class Film(Part):
     @model_validator(mode="after")
     def _odd(self) -> Self:
         if self.n_z % 2 == 0:
-            raise ValueError(f"n_z = {self.n_z} must be odd; a node lies in the middle")
+            raise ValueError(f"n_z = {self.n_z} must be odd; one line of nodes lies in the middle")
         return self
 
 
 class JournalStart(Part):
-    """Where the journal is released, at rest, over the radial clearance."""
+    """Release position of the journal, at rest, over the radial clearance."""
 
-    x: Ratio = Field(default=0.0, gt=-1, lt=1, description="along X, over the radial clearance")
-    y: Ratio = Field(default=0.0, gt=-1, lt=1, description="along Y, over the radial clearance")
+    x: Ratio = Field(
+        default=0.0, gt=-1, lt=1, description="position along X, over the radial clearance"
+    )
+    y: Ratio = Field(
+        default=0.0, gt=-1, lt=1, description="position along Y, over the radial clearance"
+    )
 
     @model_validator(mode="after")
     def _inside(self) -> Self:
@@ -320,23 +337,23 @@ class JournalStart(Part):
 
 
 class JournalNumerics(Numerics):
-    """What the integrator may be told."""
+    """Settings of the integrator."""
 
     integrator: Literal["euler", "rk4", "adaptive"] = Field(
-        default="adaptive", description="euler and rk4 take fixed steps, adaptive follows the error"
+        default="adaptive", description="euler and rk4: fixed steps; adaptive: error-controlled"
     )
     tolerance: Ratio = Field(
-        default=1e-5, ge=1e-12, le=1e-2, description="of the adaptive one, over the gap left"
+        default=1e-5, ge=1e-12, le=1e-2, description="error tolerance of adaptive, over the gap"
     )
 
 
 class ProximityProbe(Part):
-    """An eddy-current probe with its converter: it reads the shaft's motion towards itself."""
+    """An eddy-current probe with its converter; it reads the shaft's motion towards it."""
 
-    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="of its channel")
-    angle: _SHAFT_ANGLE = Field(description="of its place, from X in the direction of rotation")
-    place: str = Field(default="", description="where it sits, for the report")
-    direction: str = Field(default="", description="which way it looks, for the report")
+    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="channel name")
+    angle: _SHAFT_ANGLE = Field(description="position from X in the direction of rotation")
+    place: str = Field(default="", description="location, for the report")
+    direction: str = Field(default="", description="direction, for the report")
     gain: Ratio = Field(
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
@@ -345,25 +362,27 @@ class ProximityProbe(Part):
     )
     noise: Length = Field(default=0.0, ge=0, le=_GAP_MOST, description="rms of white noise")
     mains: Length = Field(
-        default=0.0, ge=0, le=_GAP_MOST, description="rms of hum, harmonics and all"
+        default=0.0, ge=0, le=_GAP_MOST, description="rms of mains hum with harmonics"
     )
-    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="mains frequency")
     range: Length = Field(
         ge=_GAP_LEAST, le=_GAP_MOST, description="full scale, plus and minus, about the set gap"
     )
-    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
 
 
 class ScarLimits(Part):
-    """Limits of the depth of a worn scar, with their source."""
+    """Limits of the depth of a worn scar, and their source."""
 
     as_new: Length = Field(gt=0, le=LONGEST, description="depth after running in")
-    condemning: Length = Field(gt=0, le=LONGEST, description="the shell must be renewed above it")
+    condemning: Length = Field(
+        gt=0, le=LONGEST, description="depth above which the shell must be renewed"
+    )
     grade_edges: tuple[Length, Length, Length] = Field(
         description="depth at which grades 1, 2 and 3 begin"
     )
     source: str = Field(
-        min_length=1, description="standard, maker or judgement that the limits come from"
+        min_length=1, description="origin of the limits: standard, maker or judgement"
     )
 
     @model_validator(mode="after")
@@ -383,7 +402,7 @@ class ScarLimits(Part):
 
 
 class JournalScene(Scene):
-    """A rigid rotor in a hydrodynamic journal bearing, seen by proximity probes."""
+    """A rigid rotor in a hydrodynamic journal bearing, measured by proximity probes."""
 
     physics = "wearstate.sim.machine.journal"
     effects = ("film", "mesh", "tolerance", "step")
@@ -402,7 +421,7 @@ class JournalScene(Scene):
     machine: Literal["journal-bearing"] = Field(description="journal-bearing")
     gravity: Gravity = STANDARD_GRAVITY
     settling_revolutions: int = Field(
-        default=3, ge=0, le=1000, description="run before the recording; 0: it begins at the start"
+        default=3, ge=0, le=1000, description="revolutions before the recording; 0: none"
     )
     drive: JournalDrive
     bearing: Bearing
@@ -428,7 +447,7 @@ class JournalScene(Scene):
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
-        """Faults between parts, of those parts that are there."""
+        """Faults between those parts that are present."""
         checks = (
             (_channel_faults, ("sensors", "tacho")),
             (_film_faults, ("film", "bearing")),
@@ -441,7 +460,7 @@ def _channel_faults(sensors: tuple[ProximityProbe, ...], tacho: Tacho | None) ->
 
 
 def _film_faults(film: Film, bearing: Bearing) -> list[str]:
-    """Rungs that know a plain bore only."""
+    """Find films that need a plain bore in a shaped one."""
     shaped = [
         name
         for name, there in (
@@ -455,13 +474,13 @@ def _film_faults(film: Film, bearing: Bearing) -> list[str]:
     if film.rung == "direct" or not shaped:
         return _inlet_faults(film, bearing)
     return [
-        f"film.rung = '{film.rung}' knows a plain bore only, bearing has {' and '.join(shaped)}; "
+        f"film.rung = '{film.rung}' needs a plain bore, but bearing has {' and '.join(shaped)}; "
         "set film.rung = 'direct'"
     ]
 
 
 def _inlet_faults(film: Film, bearing: Bearing) -> list[str]:
-    """What a film with a starved inlet does not know."""
+    """Find combinations that a film with a starved inlet does not support."""
     if bearing.inlet_fill == 1:
         return []
     faults, fill = [], f"bearing.inlet_fill = {bearing.inlet_fill:g}"

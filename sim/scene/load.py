@@ -1,8 +1,8 @@
-"""What the machine is: frozen, validated, without physics.
+"""Load scenes: frozen, validated, without physics.
 
 A scene is a TOML file. Numbers are SI; a string carries its unit (``"0.25 mm"``, ``"300 rpm"``).
-Validation happens here once, reports every error at once as a dotted path with value, bound and
-cure, and names the nearest match of an unknown key. Kernels trust what passes.
+Validation happens here, once. It reports all errors together, each as a dotted path with value,
+bound and cure, and suggests the nearest match of an unknown key. Kernels trust validated scenes.
 """
 
 import re
@@ -32,18 +32,18 @@ from .shaft import ShaftScene
 SCENE_FOLDER = Path(__file__).parent / "built_in"
 
 MINIMAL_FOLDER = Path(__file__).parent / "minimal"
-"""The shortest scene of each machine, to begin one's own from: ``pump.toml`` and so on."""
+"""Shortest scene of each machine, as a starting point: ``pump.toml`` and so on."""
 
 LARGEST_TEXT = 2**18
-"""Longest believable text of a scene or recipe; those built in have 20,000 characters at most.
+"""Longest plausible text of a scene or recipe; built-in ones have at most 20,000 characters.
 
-The parser takes some 50 microseconds for a key, so that this is refused or read within a second.
+The parser takes some 50 microseconds per key, so that any text is refused or read within a second.
 """
 
 DEEPEST = 32
-"""Tables and lists in each other; those built in have six."""
+"""Largest depth of nested tables and lists; built-in texts have six."""
 
-# from the begin of a word, and never back: a long word must not take the square of its length
+# possessive from the start of a word: a long word must not take quadratic time
 _WORD = r"""(?:(?<![\w-])[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"{_WORD}(?:[ \t]*+\.[ \t]*+{_WORD}){{{2 * DEEPEST}}}")
 _LONG_NUMBER = "must have <= 64 bit; write it with a point or an exponent"
@@ -52,11 +52,11 @@ _LONG_NUMBER = "must have <= 64 bit; write it with a point or an exponent"
 MACHINES: dict[str, type[Scene]] = {
     machine_name(kind): kind for kind in (PumpScene, JournalScene, ShaftScene)
 }
-"""The scene type of every machine. A new machine is one entry; all else is asked of the type."""
+"""Scene type of every machine. A new machine is one entry; its type holds all else."""
 
 
 def short_name(kind: type[Scene]) -> str:
-    """What people call the machine of a scene type.
+    """Common name of the machine of a scene type.
 
     Examples
     --------
@@ -67,12 +67,12 @@ def short_name(kind: type[Scene]) -> str:
 
 
 def machine_type(name: str) -> type[Scene]:
-    """Scene type of a machine, by what people call it or by its whole name.
+    """Scene type of a machine, by its common or its full name.
 
     Raises
     ------
     SceneError
-        There is none; the nearest is named.
+        There is no such machine; the message suggests the nearest name.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def machine_type(name: str) -> type[Scene]:
     """
     known = {**{short_name(kind): kind for kind in MACHINES.values()}, **MACHINES}
     if name not in known:
-        raise SceneError(name, [f"{name} is no machine of this program{nearest(name, known)}"])
+        raise SceneError(name, [f"{name} is no known machine{nearest(name, known)}"])
     return known[name]
 
 
@@ -91,7 +91,7 @@ def minimal_text(machine: str) -> str:
     Parameters
     ----------
     machine : str
-        As of :func:`machine_type`.
+        As for :func:`machine_type`.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def minimal_text(machine: str) -> str:
 
 
 def all_wear_places() -> dict[str, WearPlace]:
-    """Every value of any machine's scene that says how worn it is, by its dotted path.
+    """Wear quantities of all machines' scenes, by dotted path.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def scene_names() -> list[str]:
     Returns
     -------
     list of str
-        What :func:`load_scene` and ``wearstate.simulate`` take.
+        Accepted by :func:`load_scene` and ``wearstate.simulate``.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def scene_text(name_or_path: str | Path) -> str:
     Raises
     ------
     SceneError
-        There is neither a built-in scene nor a file of that name; the nearest is named.
+        There is no built-in scene or file of that name; the message suggests the nearest.
     """
     built_in = SCENE_FOLDER / f"{name_or_path}.toml"
     path = built_in if built_in.is_file() else Path(name_or_path)
@@ -163,7 +163,7 @@ def scene_text(name_or_path: str | Path) -> str:
 
 
 def unread_text(name_or_path: str | Path, what: str, names: Sequence[str], error: Exception) -> str:
-    """Why there is no text of a scene or recipe at a place; the nearest built-in one is named.
+    """Why a scene or recipe cannot be read; suggests the nearest built-in one.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def unread_text(name_or_path: str | Path, what: str, names: Sequence[str], error
     """
     path = Path(name_or_path)
     if isinstance(error, UnicodeDecodeError):
-        return f"{path} is no UTF-8 text, must be a {what} (.toml); data sets and models are none"
+        return f"{path} is no UTF-8 text, must be a {what} (.toml), not a data set or model"
     if path.is_dir():
         return f"{path} is a folder, must be a {what} (.toml); name a file in it"
     if isinstance(error, PermissionError):
@@ -187,7 +187,7 @@ def unread_text(name_or_path: str | Path, what: str, names: Sequence[str], error
 
 
 def scene_folder(name_or_path: str | Path) -> Path:
-    """Folder in which the files that a scene names are looked for first.
+    """Folder searched first for the files that a scene names.
 
     Examples
     --------
@@ -204,20 +204,20 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
     Raises
     ------
     SceneError
-        The text is no TOML; the message gives line and column.
+        The text is not TOML; the message gives line and column.
     """
     if len(text) > LARGEST_TEXT:
-        fault = f"{len(text)} characters must be <= {LARGEST_TEXT}; keep tables in files beside it"
+        fault = f"{len(text)} characters must be <= {LARGEST_TEXT}; keep tables in separate files"
         raise SceneError(name, [fault])
     try:
-        if _LONG_KEY.search(text):  # the parser takes the square of its length
+        if _LONG_KEY.search(text):  # the parser takes quadratic time in its length
             raise RecursionError
         table, faults = _parsed(text)
     except RecursionError:
         raise SceneError(name, ["not TOML: lists or tables nested too deep; flatten it"]) from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(name, [f"not TOML: {error}; mend the line it names"]) from None
-    except ValueError:  # a whole number that Python does not turn
+    except ValueError:  # a whole number that Python does not convert
         raise SceneError(name, [f"a whole number {_LONG_NUMBER}"]) from None
     if faults:
         raise SceneError(name, [*faults])
@@ -227,13 +227,13 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
 
 @lru_cache(maxsize=32)
 def _parsed(text: str) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Table of a text, and what is wrong with it; kept, as recipes of one scene read it in turn."""
+    """Parse a text and find its faults; cached, as several recipes may read one scene."""
     table = tomllib.loads(text)
     return table, tuple(_unlike_toml(table))
 
 
 def _unlike_toml(table: Mapping[str, Any]) -> list[str]:
-    """Whole numbers longer than TOML has them; raises RecursionError where it is too deep."""
+    """Find whole numbers too long for TOML; raises RecursionError if nested too deep."""
     faults: list[str] = []
     queue: list[tuple[tuple[str, ...], Any]] = [((), table)]
     while queue:
@@ -255,25 +255,25 @@ def scene_from_table(table: Mapping[str, Any]) -> Scene:
     Parameters
     ----------
     table : mapping
-        Nested tables, as TOML gives them.
+        Nested tables, as parsed from TOML.
 
     Returns
     -------
     Scene
-        Frozen scene of the type that ``machine`` names.
+        Frozen scene of the type named by ``machine``.
 
     Raises
     ------
     SceneError
-        Every fault at once, each as dotted path, value, bound and cure.
+        All faults together, each as dotted path, value, bound and cure.
     """
     name = str(table.get("name", "scene"))
     machine = table.get("machine")
-    if machine is None or isinstance(machine, list):  # which a recipe has
+    if machine is None or isinstance(machine, list):  # a recipe has a list
         raise SceneError(name, [f"machine is missing{_unlike_scene(table)}"])
     if not isinstance(machine, str) or machine not in MACHINES:
         hint = nearest(str(machine), MACHINES)
-        raise SceneError(name, [f"machine = {machine!r} is no machine of this program{hint}"])
+        raise SceneError(name, [f"machine = {machine!r} is no known machine{hint}"])
     return validate_table(MACHINES[machine], table, name)
 
 
@@ -285,7 +285,7 @@ def _unlike_scene(table: Mapping[str, Any]) -> str:
 
 
 def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
-    """Load a built-in scene or a TOML file, with values replaced by dotted path.
+    """Load a built-in scene or a TOML file, optionally with values replaced by dotted path.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
     Raises
     ------
     SceneError
-        Every fault at once.
+        All faults together.
 
     Examples
     --------
@@ -316,13 +316,13 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
 
 
 def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of a table with values replaced by dotted path (list entries by number or name).
+    """Copy a table with values replaced by dotted path (list entries by number or name).
 
     Raises
     ------
     SceneError
-        A path leads through something that is no table, past the end of a list, or to a name that
-        the list does not have.
+        A path leads through something that is not a table, past the end of a list, or to a name
+        that is not in the list.
 
     Examples
     --------
@@ -346,9 +346,9 @@ def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, A
 
 
 def numbered(table: Mapping[str, Any], path: str) -> str:
-    """Dotted path with list entries by number where they were given by name.
+    """Dotted path with list entries by number instead of name.
 
-    What the table does not have stays as it is.
+    Entries that the table does not have stay unchanged.
 
     Examples
     --------
@@ -373,7 +373,7 @@ _PLAIN = frozenset({str, float, int, bool})
 
 
 def _copy(node: Any) -> Any:
-    if type(node) in _PLAIN:  # nearly all of a table; asking for its abstract class is slow
+    if type(node) in _PLAIN:  # most of a table; checking against the abstract class is slow
         return node
     if isinstance(node, Mapping):
         return {key: _copy(value) for key, value in node.items()}
@@ -393,11 +393,11 @@ def _replace(node: Any, keys: list[str], value: Any) -> None:
 
 
 class _NoEntryError(LookupError):
-    """A list has no such entry; the text tells which it has."""
+    """A list has no such entry; the message lists the existing ones."""
 
 
 def _index(entries: list[Any], key: str) -> int:
-    """Place in a list: counted from the front, in plain digits, or that of the entry's name."""
+    """Index in a list: counted from 0 in plain digits, or that of the entry's name."""
     if re.fullmatch("[0-9]{1,9}", key) and int(key) < len(entries):
         return int(key)
     names = [entry.get("name") if isinstance(entry, Mapping) else None for entry in entries]

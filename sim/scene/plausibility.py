@@ -1,9 +1,9 @@
-"""What no machine is likely to be or to do: warnings about scenes and recordings that run well.
+"""Plausibility checks: warnings about scenes and recordings that run but look wrong.
 
-An error bars what cannot be computed. These checks ask whether what is computed can be meant: the
-estimated error of a run is that of its integration, and says nothing about a casing of two
-kilograms or a shaft that nothing excites. Every check is one row with the value that is usual, and
-every warning tells the number found, what is usual, and the cure.
+An error prevents a run that cannot be computed. These checks ask whether a computable scene can be
+meant: the error estimate of a run covers its integration, not a casing of two kilograms or a shaft
+without excitation. Every check is one row with its usual value, and every warning gives the value
+found, the usual value and the cure.
 """
 
 import math
@@ -27,19 +27,19 @@ from .shaft import ShaftScene
 Signal = NDArray[np.float32]
 
 FEWEST_TURNS = 20.0
-"""Revolutions of a recording: orders are then a twentieth of the speed apart, and a mean over
-revolutions has an error of a fifth of its scatter."""
+"""Revolutions of a recording: orders are then resolved to a twentieth of the speed, and a mean over
+revolutions has an error of about a fifth of its scatter."""
 
-_TURN_ROUNDING = 1e-6  # of a duration written as so many revolutions
+_TURN_ROUNDING = 1e-6  # of a duration given as a number of revolutions
 
 LEAST_MASS_RATIO = 2.0
 """Casing over piston and rod; 5 to 30 is usual, or the foot would follow the piston."""
 
 MOST_DEFLECTION = 1e-3
-"""Of a casing under the largest steady force [m]; usual are some hundredths of a millimetre."""
+"""Deflection of a casing under the largest steady force [m]; usual: hundredths of a millimetre."""
 
 MOST_ABOVE = 0.5
-"""Share of casing modes above half the sample rate: those move nothing that is recorded."""
+"""Share of casing modes above half the sample rate: they do not appear in the recording."""
 
 LEAST_LEVEL = 1e-3
 """Largest deviation from the mean over the sensor's range; a few per cent is usual."""
@@ -48,22 +48,22 @@ LEAST_OVER_NOISE = 1.1
 """rms over the rms of the sensor's own noise; 30 times is usual."""
 
 MOST_VELOCITY = 0.112
-"""rms within 10 Hz to 1 kHz [m/s], the highest severity grade that ISO 10816-6 has for
-reciprocating machines; others stay below a tenth of it."""
+"""rms within 10 Hz to 1 kHz [m/s], the highest severity grade of ISO 10816-6 for
+reciprocating machines; other machines stay below a tenth of it."""
 
 _VELOCITY_BAND = (10.0, 1000.0)  # Hz, the band of that standard
 
 
 @dataclass(frozen=True, kw_only=True)
 class Doubt:
-    """One thing that is hardly meant.
+    """One implausible value.
 
     Attributes
     ----------
     check : str
         Row of :data:`SCENE_CHECKS` or :data:`RECORD_CHECKS`.
     text : str
-        Value, what is usual, and the cure.
+        Value, usual value, and cure.
     """
 
     check: str
@@ -72,22 +72,22 @@ class Doubt:
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """A recording, and what is known of its sensors.
+    """A recording, and the limits of its sensors.
 
     Attributes
     ----------
     signal : numpy.ndarray [shape=(n_channels, n_samples)]
         Finite, in the unit of each channel.
     sample_rate : float
-        [Hz]
+        Sampling rate [Hz].
     channels : sequence of Channel
         One per row.
     tacho : str, optional
         Name of the tacho channel.
     turns : float
-        Revolutions in it; NaN where unknown.
+        Revolutions in the recording; NaN if unknown.
     full_scale, noise : mapping
-        Of a sensor by the name of its channel [unit of the channel]; left out where unknown.
+        Sensor limits by channel name [unit of the channel]; omitted if unknown.
     """
 
     signal: Signal
@@ -99,7 +99,7 @@ class Seen:
     noise: Mapping[str, float] = field(default_factory=dict)
 
     def rows(self) -> Iterator[tuple[Channel, Signal]]:
-        """Every channel but the tacho."""
+        """Every channel except the tacho."""
         for channel, row in zip(self.channels, self.signal, strict=True):
             if channel.quantity != "tacho" and channel.name != self.tacho:
                 yield channel, row
@@ -109,12 +109,12 @@ class Seen:
 
 
 def scene_doubts(scene: Scene) -> tuple[Doubt, ...]:
-    """What of a scene is hardly meant, before it is run.
+    """Implausible values of a scene, before it is run.
 
     Parameters
     ----------
     scene : Scene
-        Without faults.
+        A valid scene.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def _light_casing(pump: PumpScene) -> Iterator[str]:
 
 
 def modal_mass(mode: CasingMode) -> float:
-    """Mass felt at the liveliest place of a mode [kg]."""
+    """Modal mass at the place of largest amplitude of a mode [kg]."""
     largest = max(abs(value) for value in mode.shape.values())
     return 1 / largest**2 if largest > 0 else math.inf
 
@@ -180,7 +180,7 @@ def _soft_casing(pump: PumpScene) -> Iterator[str]:
 
 
 def largest_deflection(pump: PumpScene) -> tuple[str, str, float] | None:
-    """Largest static deflection of a sensor under the largest steady force at a place.
+    """Largest static deflection of a sensor under the largest steady force at any place.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def largest_deflection(pump: PumpScene) -> tuple[str, str, float] | None:
     Returns
     -------
     tuple of str, str, float, or None
-        Place of the force, sensor, and how far it moves [m]; None of a casing without modes.
+        Place of the force, sensor, and deflection [m]; None for a casing without modes.
 
     Examples
     --------
@@ -220,7 +220,7 @@ def _compliance(modes: Sequence[CasingMode], place: str, sensor: str) -> float:
 
 
 def largest_force(pump: PumpScene) -> float:
-    """Of liquid and piston of one throw, as they reach the casing [N]."""
+    """Largest force of liquid and piston of one throw on the casing [N]."""
     area = math.pi / 4 * pump.piston.diameter**2
     pressure = max(abs(pump.pressure.suction), abs(pump.pressure.discharge))
     liquid = area * pressure if pump.pressure.rung != "none" else 0.0
@@ -241,7 +241,7 @@ def _modes_outside(pump: PumpScene) -> Iterator[str]:
 
 
 def _nodes(pump: PumpScene) -> Iterator[str]:
-    """Sensors that no force reaches through any mode."""
+    """Find sensors that no force reaches through any mode."""
     modes = pump.casing.modes
     for sensor in pump.accelerometers if modes else ():
         if not any(mode.shape[sensor.name] and _driven(mode) for mode in modes):
@@ -257,7 +257,7 @@ def _driven(mode: CasingMode) -> bool:
 
 
 def _fast_waves(pump: PumpScene) -> Iterator[str]:
-    """Pipes whose waves outrun sound in their liquid without air.
+    """Find pipes whose waves are faster than sound in their liquid without air.
 
     Korteweg (1878): ``a = c / sqrt(1 + K D / (E e))`` in a pipe of modulus E and wall e, so a rigid
     one has the speed of sound c of the liquid itself, and any other less.
@@ -279,7 +279,7 @@ def _fast_waves(pump: PumpScene) -> Iterator[str]:
 
 
 def _unread_oil(pump: PumpScene) -> Iterator[str]:
-    """Pins with oil whose rung is a dry one."""
+    """Find pins with oil whose rung is dry."""
     joints = {
         f"throws.{index}.joint" if throw.joint else "joint": throw.joint or pump.joint
         for index, throw in enumerate(pump.throws)
@@ -328,11 +328,11 @@ class SceneCheck:
     ----------
     name : str
     machine : type
-        Scenes that it is for.
+        Scene types that it applies to.
     function : callable
-        Scene to texts; none where nothing is in doubt.
+        Scene to texts; none if nothing is implausible.
     usual : str
-        In words.
+        Usual value, in words.
     """
 
     name: str
@@ -394,14 +394,14 @@ SCENE_CHECKS: tuple[SceneCheck, ...] = (
         usual="balance quality G 2.5 to G 6.3",
     ),
 )
-"""Every check of a scene. A new one is one function and one row."""
+"""All checks of a scene. A new one is one function and one row."""
 
 
 # --- recordings
 
 
 def record_doubts(seen: Seen) -> tuple[Doubt, ...]:
-    """What of a recording is hardly meant.
+    """Implausible values of a recording.
 
     Parameters
     ----------
@@ -417,8 +417,8 @@ def record_doubts(seen: Seen) -> tuple[Doubt, ...]:
     >>> still = np.zeros((1, 100), dtype=np.float32)
     >>> doubts = record_doubts(Seen(signal=still, sample_rate=1e3, channels=(channel,)))
     >>> print(doubts[0].text)
-    channel 'acc' is 0 m/s^2 throughout, usual is a vibration; look at the sensor, and at what \
-excites the machine
+    channel 'acc' is 0 m/s^2 throughout, usual is a vibration; check the sensor, and the \
+excitation of the machine
     """
     return tuple(
         Doubt(check=row.name, text=text) for row in RECORD_CHECKS for text in row.function(seen)
@@ -439,12 +439,12 @@ def _still(seen: Seen) -> Iterator[str]:
         if row.min() == row.max():
             yield (
                 f"channel '{channel.name}' is {float(row[0]):g} {channel.unit} throughout, usual "
-                "is a vibration; look at the sensor, and at what excites the machine"
+                "is a vibration; check the sensor, and the excitation of the machine"
             )
 
 
 def _faint(seen: Seen) -> Iterator[str]:
-    """Levels of a thousandth of the range, but for those that the check of noise names."""
+    """Find levels below a thousandth of the range, except those that are pure noise."""
     for channel, row in seen.rows():
         full = seen.full_scale.get(channel.name, 0.0)
         largest = float(np.abs(row - row.mean(dtype=np.float64)).max())
@@ -462,7 +462,7 @@ def _noise_alone(seen: Seen) -> Iterator[str]:
             yield (
                 f"channel '{channel.name}' holds {float(row.std(dtype=np.float64)):.3g} "
                 f"{channel.unit} rms, its own noise of {seen.noise[channel.name]:.3g} "
-                f"{channel.unit} and hardly more, usual is 30 times; excite the machine, or take a "
+                f"{channel.unit} and hardly more, usual is 30 times; excite the machine, or use a "
                 "quieter sensor"
             )
 
@@ -488,7 +488,7 @@ def _violent(seen: Seen) -> Iterator[str]:
 
 def _band_velocity(acceleration: Signal, fs: float) -> float:
     """Velocity within the band of the standard, rms [m/s]."""
-    from scipy import fft  # this file is imported wherever a scene is checked
+    from scipy import fft  # this module is imported with every scene
 
     n = len(acceleration)
     spectrum = fft.rfft(acceleration)
@@ -500,7 +500,7 @@ def _band_velocity(acceleration: Signal, fs: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordCheck:
-    """One check of a recording; attributes as of :class:`SceneCheck`."""
+    """One check of a recording; attributes as in :class:`SceneCheck`."""
 
     name: str
     function: Callable[[Seen], Iterator[str]]
@@ -514,14 +514,14 @@ RECORD_CHECKS: tuple[RecordCheck, ...] = (
     RecordCheck(name="noise alone", function=_noise_alone, usual="30 times the noise"),
     RecordCheck(name="violent", function=_violent, usual="less than 112 mm/s rms"),
 )
-"""Every check of a recording. A new one is one function and one row."""
+"""All checks of a recording. A new one is one function and one row."""
 
 
 # --- both
 
 
 def sensor_limits(scene: Scene) -> tuple[dict[str, float], dict[str, float]]:
-    """Range and noise of every sensor of a scene by the name of its channel.
+    """Range and noise of every sensor of a scene, by channel name.
 
     Parameters
     ----------
@@ -543,14 +543,14 @@ def sensor_limits(scene: Scene) -> tuple[dict[str, float], dict[str, float]]:
 
 
 def solution_doubts(scene: Scene, solution: Recording) -> tuple[Doubt, ...]:
-    """What of a run is hardly meant: its scene, and what came of it.
+    """Implausible values of a run: its scene and its recording.
 
     Parameters
     ----------
     scene : Scene
-        Of the run.
+        Scene of the run.
     solution : Recording
-        That did not fail.
+        Result that did not fail.
 
     Examples
     --------

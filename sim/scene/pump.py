@@ -1,4 +1,4 @@
-"""The parts of a reciprocating pump and their cross checks."""
+"""Parts of a reciprocating pump and their cross checks."""
 
 import math
 from collections.abc import Mapping
@@ -57,38 +57,40 @@ from .scene import (
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m
 _AREA_MOST = 1e4  # m^2
-_ROUNDING = 1e-9  # of the inertia of an even bar, which is the least there is
+_ROUNDING = 1e-9  # of the inertia of a uniform bar, the lower bound
 
 _MOST_THROWS = 32
 
 
 class Motor(Part):
-    """An asynchronous motor with everything that turns with it, all referred to the crank.
+    """An asynchronous motor with everything that turns with it, referred to the crank.
 
     Moment ``2 M_b / (s / s_b + s_b / s)`` at the slip s, after Kloss. Give exactly one of
-    `rated_slip` and `synchronous_speed`: a motor that drive.speed governs, or one on the mains.
+    `rated_slip` (drive.speed sets the speed) and `synchronous_speed` (the mains does).
     """
 
     rated_slip: Ratio | None = Field(
         default=None,
         ge=0,
         lt=0.5,
-        description="slip at drive.speed: without load it is speed / (1 - rated_slip)",
+        description="slip at drive.speed; no-load speed is speed / (1 - rated_slip)",
     )
     synchronous_speed: RotationSpeed | None = Field(
         default=None,
         gt=0,
         le=1000,
-        description="of the crank, no load, whatever drive.speed, that at the start",
+        description="no-load speed at the crank; drive.speed is then the initial speed",
     )
-    breakdown_moment: Moment = Field(gt=0, le=_MOMENT_MOST, description="largest, at the crank")
+    breakdown_moment: Moment = Field(
+        gt=0, le=_MOMENT_MOST, description="largest moment, at the crank"
+    )
     breakdown_slip: Ratio = Field(
         default=0.2, ge=1e-3, le=10, description="slip at which the moment is largest"
     )
     inertia: Inertia = Field(
         ge=INERTIA_LEAST,
         le=INERTIA_MOST,
-        description="of crank, flywheel, gear and rotor, at the crank",
+        description="inertia of crank, flywheel, gear and rotor, at the crank",
     )
 
     @model_validator(mode="after")
@@ -98,13 +100,13 @@ class Motor(Part):
         if len(given) != 1:
             raise ValueError(
                 f"{' and '.join(given) or 'neither'} given, must be exactly one of rated_slip and "
-                "synchronous_speed; keep rated_slip where drive.speed sets the speed"
+                "synchronous_speed; keep rated_slip if drive.speed sets the speed"
             )
         return self
 
 
 class Drive(Part):
-    """How the crank is turned: at constant speed, or by a motor whose speed gives way."""
+    """Drive of the crank: constant speed, or a motor whose speed drops under load."""
 
     rung: Literal["constant-speed", "motor"] = Field(
         default="constant-speed", description="constant-speed, or a motor that slows under load"
@@ -112,13 +114,13 @@ class Drive(Part):
     speed: RotationSpeed = Field(
         gt=0,
         le=1000,
-        description="crank speed in rev/s, constant, or that of the motor at its usual load",
+        description="crank speed in rev/s: constant, or the motor's at rated load",
     )
     start_angle: Angle = Field(
         default=0.0,
         ge=-ANGLE_MOST,
         le=ANGLE_MOST,
-        description="crank angle at the first sample (of a motor: expected there)",
+        description="crank angle at the first sample (motor: expected value)",
     )
     motor: Motor | None = None
 
@@ -130,14 +132,14 @@ class Drive(Part):
 
     @property
     def synchronous_speed(self) -> float:
-        """Of the motor without load, at the crank [Hz]; `speed` without a motor."""
+        """Speed of the motor without load, at the crank [Hz]; `speed` without a motor."""
         if self.motor is None:
             return self.speed
         return self.motor.synchronous_speed or self.speed / (1 - (self.motor.rated_slip or 0.0))
 
 
 class Crank(Part):
-    """The crank throws."""
+    """Crank with its throws."""
 
     radius: Length = Field(gt=0, le=LONGEST, description="half the stroke")
     unbalance: Unbalance = Field(
@@ -150,7 +152,7 @@ class Crank(Part):
         default=None,
         ge=LIGHTEST,
         le=HEAVIEST,
-        description="of crank, flywheel and all that turns on the main bearings, where they have "
+        description="mass of crank, flywheel and all that turns on the main bearings, if they have "
         "play",
     )
     bearing: MainBearing | None = None
@@ -165,52 +167,52 @@ class Crank(Part):
 class Rod(Part):
     """The connecting rod: rigid, or elastic with its first axial and its first bending mode.
 
-    Of an elastic rod the mass is spread evenly between the eyes but for what mass, centre of mass
-    and inertia leave to either of them.
+    The mass of an elastic rod is spread evenly between the eyes, except for eye masses that follow
+    from mass, centre of mass and inertia.
     """
 
     rung: Literal["rigid", "elastic"] = Field(
-        default="rigid", description="rigid, or one that stretches and bends"
+        default="rigid", description="rigid, or elastic in tension and bending"
     )
     length: Length = Field(
-        gt=0, le=LONGEST, description="between the centres of wrist pin and crank-pin eye"
+        gt=0, le=LONGEST, description="distance between the centres of wrist pin and crank-pin eye"
     )
-    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="with its bearing shells")
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="mass with bearing shells")
     centre_of_mass: Length = Field(ge=0, description="distance from the wrist pin")
     inertia: Inertia = Field(
-        ge=INERTIA_LEAST, le=INERTIA_MOST, description="about the centre of mass"
+        ge=INERTIA_LEAST, le=INERTIA_MOST, description="inertia about the centre of mass"
     )
     elastic_modulus: Pressure = Field(
-        default=206e9, gt=0, le=1e13, description="of an elastic rod; steel"
+        default=206e9, gt=0, le=1e13, description="modulus of elasticity of an elastic rod; steel"
     )
     section_area: Area | None = Field(
-        default=None, gt=0, le=_AREA_MOST, description="of an elastic rod's shank"
+        default=None, gt=0, le=_AREA_MOST, description="cross-section of an elastic rod's shank"
     )
     section_radius: Length | None = Field(
         default=None,
         gt=0,
         le=LONGEST,
-        description="of gyration of the shank's section in the plane of motion; of a bar its depth "
+        description="radius of gyration of the shank in the plane of motion; for a bar, depth "
         "over 3.46",
     )
     damping_ratio: Ratio = Field(
-        default=0.01, ge=0, lt=1, description="of both modes of an elastic rod"
+        default=0.01, ge=0, lt=1, description="damping of both modes of an elastic rod"
     )
 
     @property
     def shank_mass(self) -> float:
-        """Mass that is spread evenly between the eyes [kg]."""
+        """Mass of the shank, spread evenly between the eyes [kg]."""
         lever = self.centre_of_mass * (self.length - self.centre_of_mass)
         return 6 * (self.mass * lever - self.inertia) / self.length**2
 
     @property
     def eye_masses(self) -> tuple[float, float]:
-        """What is left at wrist pin and crank pin beside the shank [kg]."""
+        """Masses of wrist-pin and crank-pin eye, in addition to the shank [kg]."""
         crank = self.mass * self.centre_of_mass / self.length - self.shank_mass / 2
         return self.mass - self.shank_mass - crank, crank
 
     @model_validator(mode="after")
-    def _elastic_told(self) -> Self:
+    def _elastic_complete(self) -> Self:
         if self.rung == "rigid":
             return self
         faults = [
@@ -231,7 +233,7 @@ class Rod(Part):
 
     @property
     def inertia_range(self) -> tuple[float, float]:
-        """Least inertia, with one eye of no mass, and that of two eyes without shank [kg m^2]."""
+        """Least inertia (one massless eye) and largest (two eyes and no shank) [kg m^2]."""
         near = min(self.centre_of_mass, self.length - self.centre_of_mass)
         most = self.mass * self.centre_of_mass * (self.length - self.centre_of_mass)
         return most - self.mass * near * self.length / 3, most
@@ -247,26 +249,29 @@ class Rod(Part):
 
 
 class Piston(Part):
-    """Piston with crosshead and wrist pin: everything that only slides."""
+    """Piston with crosshead and wrist pin: all parts that only slide."""
 
-    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="with crosshead and wrist pin")
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="mass with crosshead and wrist pin")
     diameter: Length = Field(
-        ge=0, le=LONGEST, description="bore that the cylinder pressure acts on"
+        ge=0, le=LONGEST, description="bore diameter that the cylinder pressure acts on"
     )
     inertia: Inertia | None = Field(
         default=None,
         ge=INERTIA_LEAST,
         le=INERTIA_MOST,
-        description="about the wrist pin, for a guide with clearance",
+        description="inertia about the wrist pin, for a guide with clearance",
     )
     seal_friction: Force = Field(
-        default=0.0, ge=0, le=FORCE_MOST, description="by the tension of the rings or packing"
+        default=0.0,
+        ge=0,
+        le=FORCE_MOST,
+        description="friction from the tension of rings or packing",
     )
     seal_friction_share: Ratio = Field(
         default=0.0,
         ge=0,
         le=1,
-        description="of the force of the pressure on the piston, which presses the seal on",
+        description="friction over the pressure force on the piston, which presses the seal on",
     )
     seal_friction_speed: Velocity = Field(
         default=0.01,
@@ -277,27 +282,27 @@ class Piston(Part):
 
 
 CRANK_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
-"""Where the crank mechanism pushes on the casing: x along the stroke, y across it."""
+"""Places where the crank mechanism acts on the casing: x along the stroke, y across it."""
 
 GUIDE_PLACES = ("guide_x",)
-"""Where a piston in a guide with clearance rubs, along the stroke."""
+"""Places where a piston in a guide with clearance rubs, along the stroke."""
 
 VALVE_PLACES = ("suction_valve", "discharge_valve")
-"""Where the valves strike their seats, along the stroke."""
+"""Places where the valves strike their seats, along the stroke."""
 
 FORCE_PLACES = (*CRANK_PLACES, *GUIDE_PLACES, *VALVE_PLACES)
-"""All places of forces on the casing; with a suffix ``_1``, ``_2``, … those of one throw."""
+"""All places of forces on the casing; a suffix ``_1``, ``_2``, … selects one throw."""
 
 
 class FootLimits(ScarLimits):
-    """Limits of the stretch that anchor bolts have lost, with their source."""
+    """Limits of the anchor bolts' loss of stretch, and their source."""
 
 
 _PLAY = "diametral clearance"
 
 
 class PumpScene(Scene):
-    """A reciprocating pump of one to many equal throws with clearance in its joints."""
+    """A reciprocating pump with one or more equal throws and clearance in its joints."""
 
     physics = "wearstate.sim.machine.pump"
     effects = (
@@ -361,21 +366,23 @@ class PumpScene(Scene):
     wear_wristpin: Wear | None = None
     wear_feet: FootLimits | None = None
     casing: Casing
-    running: bool = Field(default=True, description="false: the crank stands, a test at rest")
+    running: bool = Field(
+        default=True, description="false: the crank stands still, for a test at rest"
+    )
     exciters: tuple[CasingExciter, ...] = Field(default=(), max_length=MOST_SENSORS)
     sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=MOST_SENSORS)
 
     @model_validator(mode="before")
     @classmethod
     def _merge_throws(cls, table: Any) -> Any:
-        """Complete the tables of every throw with those of the scene."""
+        """Merge the scene's tables into those of every throw."""
         if not isinstance(table, Mapping) or not isinstance(table.get("throws"), (list, tuple)):
             return table
         return {**table, "throws": [_merged_throw(table, throw) for throw in table["throws"]]}
 
     @property
     def accelerometers(self) -> tuple[Accelerometer, ...]:
-        """One accelerometer for every channel: triaxial ones taken apart, see `single_axis`."""
+        """One accelerometer for every channel: triaxial ones split up, see `single_axis`."""
         return single_axis(self.sensors)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
@@ -400,28 +407,28 @@ class PumpScene(Scene):
 
     @property
     def mounted_exciters(self) -> tuple[CasingExciter, ...]:
-        """Those that push; the others are not there."""
+        """Exciters that act; unmounted ones are ignored."""
         return tuple(part for part in self.exciters if part.mounted)
 
     def joints(self, throw: int) -> PumpJoints:
-        """Joints of one throw, counted from 0."""
+        """Joints of a throw, counted from 0."""
         return self.throws[throw].joint or self.joint
 
     def pressures(self, throw: int) -> CylinderPressure:
-        """Pressure on the piston of one throw, counted from 0."""
+        """Pressure on the piston of a throw, counted from 0."""
         return self.throws[throw].pressure or self.pressure
 
     @property
     def pressure_sensors(self) -> tuple[tuple[int, PressureSensor], ...]:
         """Throw, counted from 0, and sensor of every cylinder that has one.
 
-        Where there are several throws, the number of its throw, from 1, follows each name.
+        If there are several throws, each name ends in the number of its throw, counted from 1.
         """
         return _pressure_sensors(self.pressure, self.throws)
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
-        """Faults between parts, of those parts that are there."""
+        """Faults between those parts that are present."""
         checks = (
             (_rod_faults, ("crank", "joint", "rod")),
             (_guide_faults, ("joint", "piston")),
@@ -456,7 +463,7 @@ def _guide_faults(joint: PumpJoints, piston: Piston) -> list[str]:
 
 
 def _oval_faults(joint: PumpJoints, throws: tuple[Throw, ...], wear: Wear | None) -> list[str]:
-    """One-sided wear of another eye than the crank pin's, or of one that nobody knows as new."""
+    """Find one-sided wear of an eye other than the crank pin's, or without a size as new."""
     faults = []
     for one in (joint, *(throw.joint for throw in throws if throw.joint)):
         if one.wristpin is not None and one.wristpin.one_sided > 0:
@@ -467,32 +474,32 @@ def _oval_faults(joint: PumpJoints, throws: tuple[Throw, ...], wear: Wear | None
         if one.crankpin.one_sided > 0 and wear is None:
             faults.append(
                 f"joint.crankpin.one_sided = {one.crankpin.one_sided:g} needs "
-                "wear.as_new_diametral, from which on the eye wears on one side; add the table wear"
+                "wear.as_new_diametral, where one-sided wear begins; add the table wear"
             )
     return list(dict.fromkeys(faults))
 
 
 def _play_faults(crank: Crank, joint: PumpJoints, throws: tuple[Throw, ...]) -> list[str]:
-    """A crank that is held by constraints and has play as well: no pin's force would move it."""
+    """Find a crank with play that ideal joints hold: no pin force would move it."""
     if crank.bearing is None or crank.bearing.rung == "ideal":
         return []
     pins = {(throw.joint or joint).crankpin.rung for throw in throws}
     return [
-        f"joint.crankpin.rung = '{rung}' holds the crank, must be a rung with a force where "
+        f"joint.crankpin.rung = '{rung}' holds the crank, must be a rung with a force if "
         "crank.bearing has play; set it to 'compliant', or crank.bearing.rung = 'ideal'"
         for rung in sorted(pins & {"ideal", "link"})
     ]
 
 
 def _line_faults(pressure: CylinderPressure, throws: tuple[Throw, ...]) -> list[str]:
-    """Throws on pipes of their own: all of them share one suction and one discharge line."""
+    """Find throws with pipes of their own: all throws share one suction and one discharge line."""
     each = [throw.pressure or pressure for throw in throws]
     if not any(one.rung in PIPED_RUNGS for one in each):
         return []
     names = ("rung", "suction", "discharge", "suction_line", "discharge_line", "liquid")
     return [
         f"throws.{i}.pressure.{name} must be that of the first throw: all throws share the lines "
-        "of the rungs 'lumped-lines' and 'wave-lines'; set it in the scene's own table"
+        "of the rungs 'lumped-lines' and 'wave-lines'; set it in the scene's table"
         for i, one in enumerate(each)
         for name in names
         if getattr(one, name) != getattr(each[0], name)
@@ -539,7 +546,7 @@ def _name_faults(
 def _exciter_faults(
     casing: Casing, sensors: tuple[Accelerometer, ...], exciters: tuple[CasingExciter, ...]
 ) -> list[str]:
-    """Places of mounted exciters that the casing does not know."""
+    """Find mounted exciters at places that the casing does not have."""
     if casing.frf is not None:
         known = set(FORCE_PLACES)
     else:
@@ -554,12 +561,12 @@ def _exciter_faults(
 
 
 def _rest_faults(running: bool, exciters: tuple[CasingExciter, ...], fidelity: str) -> list[str]:
-    """A pump at rest is there to be tested."""
+    """Faults of a pump at rest, which needs an exciter."""
     faults = []
     if not running and not any(part.mounted for part in exciters):
         faults.append(
-            "running = false needs an exciter with force > 0: nothing moves else; set "
-            "exciters.0.force or let it run"
+            "running = false needs an exciter with force > 0: nothing else moves; set "
+            "exciters.0.force or set running = true"
         )
     if not running and fidelity == "auto":
         faults.append(
@@ -597,7 +604,7 @@ def _shape_faults(
 
 
 def _frf_faults(frf: FrfFile, sensors: list[str], forces: list[str]) -> list[str]:
-    """Names of the scene's own table of pairs; those of the file are seen when it is read."""
+    """Find unknown names in the scene's table of pairs; the file's are checked on reading."""
     pairs = [f"{sensor}/{force}" for sensor in sensors for force in forces]
     return [
         f"casing.frf.pairs.{pair} is no sensor/place of this scene{nearest(pair, pairs)}"

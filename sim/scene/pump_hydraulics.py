@@ -1,4 +1,4 @@
-"""The parts of a scene that make the pressure in a pump cylinder: liquid, lines and valves."""
+"""Parts of a scene that determine the pressure in a pump cylinder: liquid, lines and valves."""
 
 import math
 from typing import Any, Literal, Self
@@ -47,22 +47,25 @@ _LEVEL_MOST = 1e4  # m
 _MOST_VALVES = 100
 _WAVE_SLOWEST, _WAVE_FASTEST = 10.0, 5000.0  # m/s, from a froth to solid steel
 _CONTACT_FASTEST = 1e6  # rad/s, a ball of a gram on hard steel has half of it
-_SENSOR_SLOWEST, _SENSOR_FASTEST = 1.0, 1e6  # Hz: below it no stroke is left, above it is no line
+_SENSOR_SLOWEST, _SENSOR_FASTEST = 1.0, 1e6  # Hz: no stroke visible below, no effect above
 _SENSOR_LEAST = 1.0  # Pa, a microphone's range
-_DAMPING_LEAST, _DAMPING_RATIO_MOST = 1e-3, 0.99  # of a line that swings still
+_DAMPING_LEAST, _DAMPING_RATIO_MOST = 1e-3, 0.99  # of an underdamped line
 
 
 class Liquid(Part):
-    """What is pumped; the defaults are fresh water at 20 degC with some air."""
+    """Pumped liquid; the defaults are fresh water at 20 degC with some air."""
 
     density: Density = Field(
-        default=998.2, ge=_DENSITY_LEAST, le=_DENSITY_MOST, description="at atmospheric pressure"
+        default=998.2,
+        ge=_DENSITY_LEAST,
+        le=_DENSITY_MOST,
+        description="density at atmospheric pressure",
     )
     bulk_modulus: Pressure = Field(
         default=2.18e9,
         ge=_MODULUS_LEAST,
         le=_MODULUS_MOST,
-        description="of the liquid alone, at atmospheric pressure",
+        description="modulus of the liquid alone, at atmospheric pressure",
     )
     air_fraction: Ratio = Field(
         default=0.002,
@@ -77,11 +80,11 @@ class Liquid(Part):
         description="polytropic exponent of the air: 1 isothermal, 1.4 isentropic",
     )
     vapour_pressure: Pressure = Field(
-        default=2339.0, ge=1, le=PRESSURE_MOST, description="absolute, of the liquid as it is"
+        default=2339.0, ge=1, le=PRESSURE_MOST, description="absolute, at the liquid's temperature"
     )
 
     def wave_speed(self, pressure: float) -> float:
-        """Speed of sound of liquid with its air, ``sqrt(K / rho)`` after Wood [m/s].
+        """Speed of sound of the liquid with its air, ``sqrt(K / rho)`` after Wood [m/s].
 
         Parameters
         ----------
@@ -103,10 +106,10 @@ class Liquid(Part):
 
 
 class Damper(Part):
-    """A gas vessel on a line, at the pump: ``p V^n`` of its gas stays as it is at rest."""
+    """A gas vessel on a line, at the pump: its gas keeps ``p V^n`` constant."""
 
     gas_volume: Volume = Field(
-        ge=_VOLUME_LEAST, le=_VOLUME_MOST, description="of the gas at the line's pressure at rest"
+        ge=_VOLUME_LEAST, le=_VOLUME_MOST, description="gas volume at the line's pressure at rest"
     )
     exponent: Ratio = Field(
         default=1.4,
@@ -124,17 +127,17 @@ class ReliefValve(Part):
     """
 
     set_pressure: Pressure = Field(
-        gt=0, le=PRESSURE_MOST, description="gauge, in the line, at which it begins to open"
+        gt=0, le=PRESSURE_MOST, description="opening gauge pressure in the line"
     )
-    diameter: Length = Field(gt=0, le=LONGEST, description="of its bore, fully open")
+    diameter: Length = Field(gt=0, le=LONGEST, description="bore diameter, fully open")
     accumulation: Ratio = Field(
         default=0.1,
         gt=0,
         le=1,
-        description="rise above the set pressure, over it, at which it is fully open",
+        description="relative rise above the set pressure at which it is fully open",
     )
     discharge_coefficient: Ratio = Field(
-        default=0.7, gt=0, le=1, description="flow over that of the bore without losses"
+        default=0.7, gt=0, le=1, description="flow over the lossless flow of the bore"
     )
 
 
@@ -142,8 +145,8 @@ class Line(Part):
     """A pipe between a reservoir or air vessel and the pump.
 
     Its pressure drop is ``rho (f L / D + K) u |u| / 2``, its inertia ``rho L du/dt``. `wave_speed`,
-    `damper` and `relief` are for the rungs *lumped-lines* and *wave-lines*, in which all throws
-    share it.
+    `damper` and `relief` are used by the rungs *lumped-lines* and *wave-lines*, in which all throws
+    share the line.
     """
 
     rise: Length = Field(
@@ -153,9 +156,12 @@ class Line(Part):
         description="height of the line's downstream end above its upstream end",
     )
     length: Length = Field(
-        default=0.3, ge=0, le=LONGEST, description="of moving liquid, up to the next air vessel"
+        default=0.3,
+        ge=0,
+        le=LONGEST,
+        description="length of moving liquid, up to the next air vessel",
     )
-    diameter: Length = Field(default=0.08, gt=0, le=LONGEST, description="inside")
+    diameter: Length = Field(default=0.08, gt=0, le=LONGEST, description="inside diameter")
     friction_factor: Ratio = Field(
         default=0.02, ge=0, le=_FRICTION_MOST, description="f of Darcy and Weisbach"
     )
@@ -166,14 +172,14 @@ class Line(Part):
         default=None,
         ge=_WAVE_SLOWEST,
         le=_WAVE_FASTEST,
-        description="of pressure waves: water in steel 1000 to 1400 m/s, with air a few hundred",
+        description="wave speed: water in steel 1000 to 1400 m/s, with air a few hundred",
     )
     damper: Damper | None = Field(default=None, description="gas vessel at the pump")
     relief: ReliefValve | None = Field(default=None, description="relief valve at the pump")
 
     @model_serializer(mode="wrap")
     def _without_absent_parts(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Lines of the rung *heads* are written as they were before there were any waves."""
+        """Omit absent parts, so that lines of the rung *heads* keep their written form."""
         table: dict[str, Any] = handler(self)
         for name in ("wave_speed", "damper", "relief"):
             if getattr(self, name) is None:
@@ -184,37 +190,44 @@ class Line(Part):
 class Valve(Part):
     """The self-acting plate valves of one side of a cylinder.
 
-    All figures but `leak_area` are of one of `count` equal valves. The default is a group that
+    All values except `leak_area` are for one of `count` equal valves. The default is a group that
     suits a bilge pump of 100 mm bore and stroke at 300 rpm: some 15 kPa at full flow.
     """
 
-    count: int = Field(default=4, ge=1, le=_MOST_VALVES, description="equal valves side by side")
-    diameter: Length = Field(default=0.045, gt=0, le=LONGEST, description="of the seat opening")
-    mass: Mass = Field(
-        default=0.1, ge=LIGHTEST, le=HEAVIEST, description="plate, a third of the spring, water"
+    count: int = Field(
+        default=4, ge=1, le=_MOST_VALVES, description="number of equal valves in parallel"
     )
-    stiffness: Stiffness = Field(default=3.3e3, ge=0, le=STIFFEST, description="of the spring")
+    diameter: Length = Field(
+        default=0.045, gt=0, le=LONGEST, description="diameter of the seat opening"
+    )
+    mass: Mass = Field(
+        default=0.1,
+        ge=LIGHTEST,
+        le=HEAVIEST,
+        description="mass of plate, water and a third of the spring",
+    )
+    stiffness: Stiffness = Field(default=3.3e3, ge=0, le=STIFFEST, description="spring stiffness")
     preload_lift: Length = Field(
         default=3e-3, ge=0, le=LONGEST, description="spring compression on the closed valve"
     )
     damping: Damping = Field(
-        default=2.0, ge=0, le=DAMPING_MOST, description="of the plate moving in the liquid"
+        default=2.0, ge=0, le=DAMPING_MOST, description="damping of the plate in the liquid"
     )
-    max_lift: Length = Field(default=8e-3, gt=0, le=LONGEST, description="up to the stop")
+    max_lift: Length = Field(default=8e-3, gt=0, le=LONGEST, description="lift at the stop")
     discharge_coefficient: Ratio = Field(
-        default=0.65, gt=0, le=1, description="flow over that of the gap without losses"
+        default=0.65, gt=0, le=1, description="flow over the lossless flow of the gap"
     )
     force_coefficient: Ratio = Field(
         default=1.0, gt=0, le=2, description="force over pressure drop times seat area"
     )
     seat_stiffness: Stiffness = Field(
-        default=50e6, gt=0, le=STIFFEST, description="contact with the seat and with the stop"
+        default=50e6, gt=0, le=STIFFEST, description="contact stiffness of seat and stop"
     )
     seat_damping: Damping = Field(
-        default=1.3e3, ge=0, le=DAMPING_MOST, description="contact with the seat and with the stop"
+        default=1.3e3, ge=0, le=DAMPING_MOST, description="contact damping of seat and stop"
     )
     leak_area: Area = Field(
-        default=0.0, ge=0, le=_VOLUME_MOST, description="of all paths past the closed valves"
+        default=0.0, ge=0, le=_VOLUME_MOST, description="area of all leaks past the closed valves"
     )
     stuck_lift: Length | None = Field(
         default=None, ge=0, description="lift of valves that do not move; 0: stuck shut"
@@ -223,13 +236,13 @@ class Valve(Part):
         default=10.0,
         ge=0,
         le=_LOSS_MOST,
-        description="loss coefficient on the speed in the seat opening, for the rung heads",
+        description="loss coefficient for the speed in the seat opening, rung heads",
     )
     equivalent_length: Length = Field(
         default=0.1,
         ge=0,
         le=LONGEST,
-        description="of liquid in the seat opening with the valve's inertia, for the rung heads",
+        description="length of liquid in the seat opening with the valve's inertia, rung heads",
     )
 
     @model_validator(mode="after")
@@ -264,17 +277,17 @@ class Valve(Part):
 
 
 class PressureSensor(Part):
-    """A pressure transmitter at the cylinder, with its connecting line and its converter.
+    """A pressure transmitter at the cylinder, with its connecting line and converter.
 
     It reads gauge pressure from absolute vacuum, -101,325 Pa, to the upper end of its range.
 
     Notes
     -----
-    A line full of liquid swings on the compliance C of what it leads to, with the inertance
-    ``rho L / A``: ``f = sqrt(A / (rho L C)) / (2 pi)`` [1]_. Usual numbers: a flush membrane has
+    A liquid-filled line oscillates on the compliance C of what it leads to, with the inertance
+    ``rho L / A``: ``f = sqrt(A / (rho L C)) / (2 pi)`` [1]_. Usual values: a flush membrane has
     none; 0.3 m of 4 mm tube up to a membrane quarter-wave rings at 1.2 kHz, and with a bubble of
-    0.05 cm^3 left in it (``C = V / (1.4 p)``) at some 60 Hz. It lags by ``zeta / (pi f)``, and a
-    transmitter's own time constant adds to it.
+    0.05 cm^3 in it (``C = V / (1.4 p)``) at some 60 Hz. The line lags by ``zeta / (pi f)``; the
+    transmitter's own time constant adds to that.
 
     References
     ----------
@@ -283,34 +296,40 @@ class PressureSensor(Part):
     """
 
     name: str = Field(
-        default="pressure", min_length=1, max_length=NAME_LONGEST - 3, description="of its channel"
+        default="pressure", min_length=1, max_length=NAME_LONGEST - 3, description="channel name"
     )
-    place: str = Field(default="cylinder", description="where it sits, for the report")
+    place: str = Field(default="cylinder", description="location, for the report")
     range: Pressure = Field(
-        ge=_SENSOR_LEAST, le=PRESSURE_MOST, description="upper end of its range, gauge"
+        ge=_SENSOR_LEAST, le=PRESSURE_MOST, description="upper end of the range, gauge"
     )
     gain: Ratio = Field(
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
     offset: Pressure = Field(
-        default=0.0, ge=-PRESSURE_MOST, le=PRESSURE_MOST, description="reading of the atmosphere"
+        default=0.0,
+        ge=-PRESSURE_MOST,
+        le=PRESSURE_MOST,
+        description="reading at atmospheric pressure",
     )
     noise: Pressure = Field(default=0.0, ge=0, le=PRESSURE_MOST, description="rms of white noise")
-    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
     lag: Time | None = Field(
         default=None,
         ge=1 / (math.tau * _SENSOR_FASTEST),
         le=1 / (math.tau * _SENSOR_SLOWEST),
-        description="time constant of the transmitter, first order; none: at once",
+        description="time constant of the transmitter, first order; none: no lag",
     )
     line_resonance: Frequency | None = Field(
         default=None,
         ge=_SENSOR_SLOWEST,
         le=_SENSOR_FASTEST,
-        description="of the liquid in the connecting line; none: a flush membrane",
+        description="resonance of the connecting line; none: flush membrane",
     )
     line_damping: Ratio | None = Field(
-        default=None, ge=_DAMPING_LEAST, le=_DAMPING_RATIO_MOST, description="ratio to the critical"
+        default=None,
+        ge=_DAMPING_LEAST,
+        le=_DAMPING_RATIO_MOST,
+        description="damping ratio of the line",
     )
 
     @model_validator(mode="after")
@@ -319,30 +338,30 @@ class PressureSensor(Part):
         if given[0] != given[1]:
             lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
             raise ValueError(
-                f"line_{lone} = {getattr(self, f'line_{lone}'):g} needs line_{other} beside it; "
+                f"line_{lone} = {getattr(self, f'line_{lone}'):g} needs line_{other} as well; "
                 "add it or remove both"
             )
         return self
 
 
 PIPED_RUNGS = ("lumped-lines", "wave-lines")
-"""Rungs of the pressure with pipes between the valves and the far ends."""
+"""Rungs of the pressure with pipes between the valves and the reservoirs."""
 
 BREATHING_RUNGS = ("chamber", *PIPED_RUNGS)
 """Rungs of the pressure with a compressible chamber and moving valves."""
 
 
 class CylinderPressure(Part):
-    """Gauge pressure on the piston face.
+    """Gauge pressure on the piston.
 
-    ``none``: no pressure. ``constant``: `discharge` all the time. ``two-level``: `suction` and
-    `discharge` by turns; the rise begins `rise_delay` after the bottom dead centre, when the
+    ``none``: no pressure. ``constant``: `discharge` at all times. ``two-level``: `suction` and
+    `discharge` in turn; the rise begins `rise_delay` after the bottom dead centre, when the
     suction valve has closed, and takes `rise_angle`; the fall at the other dead centre likewise,
-    with numbers of its own, since clearance volume and air expand there. ``heads``: the
-    quasi-static energy balance of the two lines, whose far ends are at `suction` and `discharge`.
-    ``chamber``: a compressible chamber with self-acting valves, `suction` and `discharge` being
-    the pressures before and after them. ``lumped-lines`` and ``wave-lines``: such chambers on two
-    pipes shared by all throws, at whose far ends `suction` and `discharge` are; a pipe is one mass
+    with its own values, since clearance volume and air expand there. ``heads``: the
+    quasi-static energy balance of the two lines, with `suction` and `discharge` at their far ends.
+    ``chamber``: a compressible chamber with self-acting valves, with `suction` and `discharge`
+    before and after them. ``lumped-lines`` and ``wave-lines``: such chambers on two
+    pipes shared by all throws, with `suction` and `discharge` at their far ends; a pipe is one mass
     on one spring, or carries waves.
     """
 
@@ -353,13 +372,17 @@ class CylinderPressure(Part):
         description="none, constant, two levels, heads in lines, chamber with valves, or chamber "
         "with lumped-lines or wave-lines",
     )
-    suction: Pressure = Field(default=0.0, ge=-STANDARD_ATMOSPHERE, description="gauge")
-    discharge: Pressure = Field(default=0.0, le=PRESSURE_MOST, description="gauge")
+    suction: Pressure = Field(
+        default=0.0, ge=-STANDARD_ATMOSPHERE, description="suction pressure, gauge"
+    )
+    discharge: Pressure = Field(
+        default=0.0, le=PRESSURE_MOST, description="discharge pressure, gauge"
+    )
     rise_angle: Angle = Field(
         default=math.radians(3.0),
         ge=math.radians(0.5),
         le=math.radians(90.0),
-        description="crank angle over which the pressure rises, and falls unless fall_angle says",
+        description="crank angle of the rise, and of the fall unless fall_angle is given",
     )
     rise_delay: Angle = Field(
         default=0.0,
@@ -371,7 +394,7 @@ class CylinderPressure(Part):
         default=None,
         ge=math.radians(0.5),
         le=math.radians(90.0),
-        description="crank angle over which the pressure falls; none: as it rises",
+        description="crank angle of the fall; none: as for the rise",
     )
     fall_delay: Angle = Field(
         default=0.0,
@@ -380,7 +403,7 @@ class CylinderPressure(Part):
         description="crank angle after the top dead centre at which the fall begins",
     )
     flow: Literal["exact", "two-harmonic"] = Field(
-        default="exact", description="flow of the rung heads"
+        default="exact", description="flow law of the rung heads"
     )
     liquid: Liquid = Liquid()
     suction_line: Line | None = None
@@ -391,15 +414,15 @@ class CylinderPressure(Part):
         default=None,
         ge=_VOLUME_LEAST,
         le=_VOLUME_MOST,
-        description="of the chamber with the piston at its top dead centre",
+        description="chamber volume at top dead centre",
     )
     sensor: PressureSensor | None = Field(
-        default=None, description="records the pressure in the cylinder; none: nobody does"
+        default=None, description="cylinder pressure sensor; none: not recorded"
     )
 
     @model_serializer(mode="wrap")
     def _without_absent_sensor(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Scenes without a sensor are written as they were before there were any."""
+        """Omit an absent sensor, so that scenes without one keep their written form."""
         table: dict[str, Any] = handler(self)
         if self.sensor is None:
             table.pop("sensor", None)
@@ -435,7 +458,7 @@ class CylinderPressure(Part):
         return faults + self._wave_faults()
 
     def _wave_faults(self) -> list[str]:
-        """Pipes whose wave speed is not told, with that of a rigid pipe and this liquid."""
+        """Find pipes without a wave speed, and give that of a rigid pipe with this liquid."""
         if self.rung not in PIPED_RUNGS:
             return []
         sides = (("suction", self.suction_line), ("discharge", self.discharge_line))
@@ -448,7 +471,7 @@ class CylinderPressure(Part):
 
     @property
     def at_pump(self) -> tuple[float, float]:
-        """Pressures at rest before and after the valves: those of the lines' far ends [Pa gauge].
+        """Pressures at rest before and after the valves, from the lines' far ends [Pa gauge].
 
         Examples
         --------
@@ -496,4 +519,4 @@ _NEEDS = {
         ("suction_line", "discharge_line", "suction_valve", "discharge_valve", "dead_volume"),
     ),
 }
-"""Rung -> what it cannot do without."""
+"""Rung -> values that it requires."""

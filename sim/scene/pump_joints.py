@@ -26,11 +26,11 @@ _ELASTICITY = {
     "hertz": ("hertz_stiffness",),
     "conformal": ("effective_modulus", "contact_length"),
 }
-"""Elasticity of a contact -> what describes it."""
+"""Elasticity of a contact -> its parameters."""
 
 
 class Contact(Part):
-    """How two surfaces of a joint push and rub; alternatives, which no order ranks."""
+    """Contact and friction of two surfaces of a joint; its laws are alternatives, not rungs."""
 
     law: Literal[
         "kelvin-voigt",
@@ -42,7 +42,7 @@ class Contact(Part):
         "exact",
     ] = Field(
         default="kelvin-voigt",
-        description="how the impact loses energy; kelvin-voigt: spring and damper",
+        description="energy loss of an impact; kelvin-voigt: spring and damper",
     )
     elasticity: Literal["linear", "hertz", "conformal"] = Field(
         default="linear",
@@ -55,31 +55,31 @@ class Contact(Part):
         default=None, gt=0, le=_HERTZ_MOST, description="force per penetration to the power 1.5"
     )
     effective_modulus: Pressure | None = Field(
-        default=None, gt=0, le=1e13, description="E* of the conformal pair"
+        default=None, gt=0, le=1e13, description="effective modulus E* of the conformal pair"
     )
     contact_length: Length | None = Field(
-        default=None, gt=0, le=LONGEST, description="along the pin, of the conformal pair"
+        default=None, gt=0, le=LONGEST, description="length of the conformal pair along the pin"
     )
     damping: Damping = Field(
-        default=0.0, ge=0, le=DAMPING_MOST, description="C_n of the law kelvin-voigt"
+        default=0.0, ge=0, le=DAMPING_MOST, description="damping C_n of the law kelvin-voigt"
     )
     restitution: Ratio | None = Field(
-        default=None, gt=0, le=1, description="of the hysteresis laws"
+        default=None, gt=0, le=1, description="coefficient of restitution of the hysteresis laws"
     )
     restitution_speed: Velocity | None = Field(
         default=None,
         ge=SLIDING_LEAST,
         le=SLIDING_MOST,
-        description="impact speed of the restitution; faster impacts lose more; none: all alike",
+        description="impact speed of the restitution; faster impacts lose more; none: constant",
     )
     speed_floor: Velocity | None = Field(
         default=None,
         ge=SLIDING_LEAST,
         le=SLIDING_MOST,
-        description="least impact speed a hysteresis law is given; none: damping at most critical",
+        description="least impact speed in a hysteresis law; none: damping at most critical",
     )
     friction_law: Literal["smooth", "ramp"] = Field(
-        default="smooth", description="how friction turns with the sliding velocity, near zero"
+        default="smooth", description="friction law near zero sliding velocity"
     )
     friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
     friction_speed: Velocity = Field(
@@ -89,10 +89,10 @@ class Contact(Part):
         description="sliding speed that regularises the Coulomb sign; full friction of the ramp",
     )
     friction_dead_speed: Velocity = Field(
-        default=0.0, ge=0, le=SLIDING_MOST, description="the ramp has no friction below it"
+        default=0.0, ge=0, le=SLIDING_MOST, description="speed below which the ramp has no friction"
     )
     tangential_damping: Damping = Field(
-        default=0.0, ge=0, le=DAMPING_MOST, description="C_t of the source paper"
+        default=0.0, ge=0, le=DAMPING_MOST, description="damping C_t of the source paper"
     )
 
     @model_validator(mode="after")
@@ -108,7 +108,7 @@ class Contact(Part):
         if self.law != "kelvin-voigt" and self.damping > 0:
             faults.append(
                 f"damping = {self.damping:g} N s/m is for the law kelvin-voigt; remove it, the law "
-                f"'{self.law}' takes its loss from restitution"
+                f"'{self.law}' uses restitution"
             )
         if self.law == "kelvin-voigt" and self.restitution_speed is not None:
             faults.append(
@@ -117,8 +117,8 @@ class Contact(Part):
             )
         if self.restitution_speed is not None and self.speed_floor is not None:
             faults.append(
-                f"speed_floor = {self.speed_floor:g} m/s has no use with restitution_speed, which "
-                "is the law's speed at every impact; remove one of them"
+                f"speed_floor = {self.speed_floor:g} m/s has no effect with restitution_speed, "
+                "which replaces the impact speed in the law; remove one of them"
             )
         if self.law == "carvalho-martins" and (self.restitution or 1) < 1 / 3:
             faults.append(
@@ -135,7 +135,7 @@ class Contact(Part):
         return self
 
     def elastic_faults(self) -> list[str]:
-        """What the elasticity lacks; asked by the rungs that need one."""
+        """Find missing parameters of the elasticity, for the rungs that need one."""
         return [
             f"{name} is missing; the elasticity '{self.elasticity}' needs it"
             for name in _ELASTICITY[self.elasticity]
@@ -144,28 +144,28 @@ class Contact(Part):
 
 
 _ROUGHNESSES = 8.0
-"""In a radial clearance at the least: see :mod:`wearstate.sim.contact.asperities`."""
+"""Least radial clearance in roughness heights: see :mod:`wearstate.sim.contact.asperities`."""
 
 OILED_RUNGS = ("film-short", "film-map", "mixed")
-"""Rungs of a joint that run in oil."""
+"""Rungs of a joint lubricated with oil."""
 
 
 class RevoluteJoint(Contact):
-    """A pin in an eye with clearance. Give exactly one of the two clearances.
+    """Pin in an eye with clearance. Give exactly one of the two clearances.
 
-    The rungs *ideal* (no clearance), *link* (always in contact), *compliant* (dry impact), and in
-    oil *film-short*, *film-map* (finite length) and *mixed* (a film and the peaks of rough
-    surfaces). In oil, elasticity and stiffness are those of the parts behind the film, and
-    friction is that of the touching peaks.
+    Rungs: *ideal* (no clearance), *link* (always in contact), *compliant* (dry impact), and with
+    oil *film-short*, *film-map* (finite length) and *mixed* (a film and the asperities of rough
+    surfaces). With oil, elasticity and stiffness describe the parts behind the film, and
+    friction the touching asperities.
     """
 
     rung: Literal["ideal", "link", "compliant", "film-short", "film-map", "mixed"] = Field(
         default="compliant",
-        description="ideal: no clearance; link: massless link as long as it; compliant: contact; "
-        "film-short, film-map: oil; mixed: oil and touching peaks",
+        description="ideal: no clearance; link: massless link of its length; compliant: contact; "
+        "film-short, film-map: oil; mixed: oil and asperities",
     )
-    oil: JointOil | None = Field(default=None, description="between pin and eye")
-    pin_diameter: Length = Field(gt=0, le=LONGEST, description="nominal")
+    oil: JointOil | None = Field(default=None, description="oil between pin and eye")
+    pin_diameter: Length = Field(gt=0, le=LONGEST, description="nominal pin diameter")
     diametral_clearance: Length | None = Field(
         default=None, ge=0, description="eye diameter minus pin diameter"
     )
@@ -176,7 +176,7 @@ class RevoluteJoint(Contact):
         default=0.0,
         ge=0,
         le=1,
-        description="of the wear beyond wear.as_new_diametral: where the load presses, so that "
+        description="share of the wear beyond wear.as_new_diametral under the load, so that "
         "the eye has the clearance along the rod and less across it",
     )
 
@@ -209,7 +209,7 @@ class RevoluteJoint(Contact):
         return self
 
     def _oil_faults(self) -> list[str]:
-        """What the oil of an oiled rung lacks."""
+        """Find missing or conflicting values of an oiled rung."""
         if self.rung not in OILED_RUNGS:
             return []
         if self.oil is None:
@@ -219,12 +219,12 @@ class RevoluteJoint(Contact):
         if self.rung == "film-map" and self.oil.filled_gap is not None:
             faults.append(
                 f"oil.filled_gap = {self.oil.filled_gap:g} m is for the rungs 'film-short' and "
-                "'mixed'; a map is of a flooded film, remove it or choose another rung"
+                "'mixed'; a map describes a flooded film; remove it or choose another rung"
             )
         return faults
 
     def _roughness_faults(self, roughness: float | None) -> list[str]:
-        """Roughness that is missing, or with which peaks would touch over half the bore."""
+        """Find roughness that is missing, or so large that peaks would touch over half the bore."""
         if roughness is None:
             return ["oil.roughness is missing; the rung 'mixed' needs it"]
         most = self.clearance_radial / _ROUGHNESSES
@@ -237,22 +237,22 @@ class RevoluteJoint(Contact):
 
     @property
     def clearance_radial(self) -> float:
-        """Radial clearance [m], whichever way it was given; 0 where none was."""
+        """Radial clearance [m], whether given as radial or diametral; 0 if neither."""
         if self.radial_clearance is not None:
             return self.radial_clearance
         return (self.diametral_clearance or 0.0) / 2
 
     @property
     def clearance_diametral(self) -> float:
-        """Diametral clearance [m], whichever way it was given; 0 where none was."""
+        """Diametral clearance [m], whether given as diametral or radial; 0 if neither."""
         return 2 * self.clearance_radial
 
 
 class MainBearing(RevoluteJoint):
-    """The main bearings of the crank with play, seen as one: the crank moves parallel to itself.
+    """The crank's main bearings with play, lumped into one: the crank moves parallel to itself.
 
-    The pin is the journal of the crank. Stiffness, damping and the length of the film are those of
-    all bearings together.
+    The pin is the journal of the crank. Stiffness, damping and film length are totals of all
+    bearings.
     """
 
     @model_validator(mode="after")
@@ -260,7 +260,7 @@ class MainBearing(RevoluteJoint):
         faults = []
         if self.rung == "link":
             faults.append(
-                "rung = 'link' must be one with a force: the crank is held by its bearings alone; "
+                "rung = 'link' must be one with a force, as only its bearings hold the crank; "
                 "set rung = 'compliant'"
             )
         if self.one_sided > 0:
@@ -274,15 +274,17 @@ class MainBearing(RevoluteJoint):
 
 
 class Guide(Contact):
-    """The guide of piston or crosshead, across the stroke in the plane of the crank."""
+    """Guide of piston or crosshead, across the stroke in the plane of the crank."""
 
     rung: Literal["ideal", "compliant"] = Field(
         default="compliant", description="ideal: no clearance; compliant: contact at four corners"
     )
-    length: Length = Field(gt=0, le=LONGEST, description="of the guided part")
-    height: Length = Field(gt=0, le=LONGEST, description="of the guided part, across the stroke")
+    length: Length = Field(gt=0, le=LONGEST, description="length of the guided part")
+    height: Length = Field(
+        gt=0, le=LONGEST, description="height of the guided part, across the stroke"
+    )
     diametral_clearance: Length = Field(
-        ge=0, le=LONGEST, description="height of the guide minus that of the guided part"
+        ge=0, le=LONGEST, description="guide height minus height of the guided part"
     )
 
     @property
@@ -299,7 +301,7 @@ class Guide(Contact):
 
 
 class PumpJoints(Part):
-    """The joints of the crank mechanism that may have clearance; an absent one is ideal."""
+    """Joints of the crank mechanism that may have clearance; an absent one is ideal."""
 
     crankpin: RevoluteJoint
     wristpin: RevoluteJoint | None = None
@@ -307,14 +309,14 @@ class PumpJoints(Part):
 
 
 class Throw(Part):
-    """One throw of the crank: its place, and where it differs from what the scene says of all.
+    """One throw of the crank: its phase, and its differences from the scene's values.
 
-    ``joint`` and ``pressure`` are merged over the scene's own tables, so that one worn joint or
-    one leaking valve takes one line; a schema takes them as ``partial``, with nothing required.
+    ``joint`` and ``pressure`` are merged over the scene's tables, so that one worn joint or
+    one leaking valve takes one line; a schema lists them as ``partial``, with nothing required.
     """
 
     phase: Angle = Field(
-        default=0.0, ge=-ANGLE_MOST, le=ANGLE_MOST, description="crank angle over the first"
+        default=0.0, ge=-ANGLE_MOST, le=ANGLE_MOST, description="crank angle from the first throw"
     )
     joint: PumpJoints | None = Field(default=None, json_schema_extra={"partial": True})
     pressure: CylinderPressure | None = Field(default=None, json_schema_extra={"partial": True})

@@ -1,4 +1,4 @@
-"""The recording of a scene: what its simulator measured, under the names that the scene gives."""
+"""Recording of a scene: the simulator's signals under the names given in the scene."""
 
 from typing import Any
 
@@ -11,16 +11,16 @@ from .scene import Scene, channels_of
 
 
 def recorded(scene: Scene, signal: NDArray[np.float32], **about: Any) -> Recording:
-    """A simulated recording of a scene.
+    """Create the recording of a simulated scene.
 
     Parameters
     ----------
     scene : Scene
-        Of which channels, sample rate and tacho are.
+        Gives the channels, the sample rate and the tacho.
     signal : ndarray of shape (n_channels, n_samples)
-        In the unit of each channel.
+        Signal in the unit of each channel.
     **about
-        Status, warnings, truth and numerics, as of :class:`~..output.recording.Recording`.
+        Status, warnings, truth and numerics, see :class:`~..output.recording.Recording`.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def recorded(scene: Scene, signal: NDArray[np.float32], **about: Any) -> Recordi
 
 
 def failed(scene: Scene, status: Status, numerics: dict[str, float | int | str]) -> Recording:
-    """The recording of a run that failed: zeros, and the status with the cure.
+    """Create the recording of a failed run: zeros, and the status with the cure.
 
     Examples
     --------

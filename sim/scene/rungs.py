@@ -1,10 +1,10 @@
-"""Rungs of the effects of a scene, and how they are put into it and refused.
+"""Rungs of a scene's effects: setting a rung, and why a scene does not admit one.
 
-A rung is one row: a name, what it assumes, where it is valid, where it comes from, what it costs,
-and the values that put it into a scene. Steps, tolerances and meshes are effects as well, with
-levels by factors of the one that is written. Alternatives that no order ranks, contact laws,
-friction laws, modes or a measured casing, are choices of a scene and no rungs. The rungs of each
-machine are beside its physics, as ``ladder.py``.
+A rung is one row: a name, what it assumes, where it is valid, its source, its cost,
+and the values that set it in a scene. Steps, tolerances and meshes are effects as well, with
+levels that are factors of the value in the scene. Alternatives without an order (contact laws,
+friction laws, modes or a measured casing) are choices of a scene and not rungs. Each machine's
+rungs are next to its physics, in ``ladder.py``.
 """
 
 import math
@@ -22,9 +22,9 @@ from .scene import Scene, SceneError, validate_table
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
 Beyond = Callable[[Scene], list[str]]
-"""What of a scene is beyond the validity of its rungs, as sentences."""
+"""Why a scene is beyond the validity of its rungs, as sentences."""
 
-_ROUNDING = 1e-9  # of a number of steps that would be whole
+_ROUNDING = 1e-9  # tolerance for a whole number of steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,20 +34,20 @@ class Rung:
     Attributes
     ----------
     name : str
-        As in the scene; of a numerical effect the factor on what is written, such as ``x2``.
+        Name in the scene; for a numerical effect, the factor on the scene's value, such as ``x2``.
     assumes : str
-        The model in one line.
+        Model in one line.
     valid : str
-        Where it may be used.
+        Range of validity.
     needs : str
-        What the scene must give.
+        Data that the scene must give.
     reference : str
         Source.
     nanoseconds_per_step : float
         Tabulated cost of the effect on one throw, or of one solve of a film, on one core of a
         2020s server, for ranking only.
     values : mapping of str to object
-        Dotted path -> value that puts the rung into the scene it was made for.
+        Dotted path -> value that sets the rung in the scene it was made for.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Rung:
 
 
 def price(table: Iterable[Rung], name: str) -> float:
-    """Tabulated cost of a rung of a table [ns]."""
+    """Tabulated cost of a table's rung [ns]."""
     return next(rung.nanoseconds_per_step for rung in table if rung.name == name)
 
 
@@ -71,16 +71,16 @@ class Effect:
     Attributes
     ----------
     name : str
-        As ``pinned`` names it.
+        Name in ``pinned``.
     machine : str
     rungs : tuple of Rung
-        Cheapest first, each with the values that put it into the scene.
+        Cheapest first, each with the values that set it in the scene.
     current : callable
-        Scene -> name of the rung that is written.
+        Scene -> name of its present rung.
     refusal : callable
         Scene, name of a rung -> why the scene does not admit it, or None.
     numerical : bool
-        A step, a tolerance or a mesh: its error goes to zero with the level.
+        Whether it is a step, tolerance or mesh, whose error goes to zero with the level.
     """
 
     name: str
@@ -91,12 +91,12 @@ class Effect:
     numerical: bool = False
 
     def rung(self, name: str) -> Rung:
-        """Rung of that name.
+        """Return the rung of that name.
 
         Raises
         ------
         KeyError
-            There is none.
+            There is no such rung.
         """
         return {rung.name: rung for rung in self.rungs}[name]
 
@@ -116,13 +116,13 @@ def admissible(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
 
 
 def with_values(scene: AnyScene, values: Mapping[str, Any]) -> AnyScene:
-    """The scene with values replaced by dotted path, validated anew.
+    """Copy of the scene with values replaced by dotted path, validated again.
 
     Parameters
     ----------
     scene : Scene
     values : mapping of str to object
-        Dotted path -> value, entries of lists by their number.
+        Dotted path -> value, list entries by number.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def with_values(scene: AnyScene, values: Mapping[str, Any]) -> AnyScene:
     Raises
     ------
     SceneError
-        Every fault of the new scene at once.
+        All faults of the new scene together.
 
     Examples
     --------
@@ -150,7 +150,7 @@ def with_values(scene: AnyScene, values: Mapping[str, Any]) -> AnyScene:
 
 
 def _grafted(node: Any, tree: Mapping[str, Any]) -> Any:
-    """Fields of a part as a table, with a tree of new values in it; the rest stays validated."""
+    """Fields of a part as a table, with a tree of new values; unchanged parts stay validated."""
     if isinstance(node, tuple):
         return [
             _grafted(entry, tree[str(i)]) if str(i) in tree else entry
@@ -167,7 +167,7 @@ def _grafted(node: Any, tree: Mapping[str, Any]) -> Any:
 
 
 def _refused(rungs: tuple[Rung, ...], beyond: Beyond, scene: Scene, name: str) -> str | None:
-    """Why a scene with that rung is none: its first fault that some other rung is without."""
+    """Why a scene does not admit a rung: the first fault that some other rung avoids."""
     found = _faults_of(next(rung for rung in rungs if rung.name == name), beyond, scene)
     if not found:
         return None
@@ -176,9 +176,9 @@ def _refused(rungs: tuple[Rung, ...], beyond: Beyond, scene: Scene, name: str) -
 
 
 def _faults_of(rung: Rung, beyond: Beyond, scene: Scene) -> tuple[str, ...]:
-    """Faults of a scene with a rung; the last ones are kept, as every rung asks for all others'.
+    """Faults of a scene with a rung; the latest are cached, as every rung needs all others'.
 
-    A scene is known by its identity, which no other takes while it is held here.
+    A scene is identified by its id, which stays unique while the scene is kept here.
     """
     key = (id(scene), beyond, tuple(rung.values.items()))
     _, faults = _KEPT.get(key) or (scene, _found_in(rung, beyond, scene))
@@ -208,20 +208,20 @@ def effect(
     beyond: Beyond,
     numerical: bool = False,
 ) -> Effect:
-    """An effect of a scene.
+    """Create an effect of a scene.
 
     Parameters
     ----------
     name : str
     scene : Scene
     rungs : iterable of Rung
-        Cheapest first, each with the values that put it into the scene.
+        Cheapest first, each with the values that set it in the scene.
     current : callable
-        Scene -> name of the rung that is written.
+        Scene -> name of its present rung.
     beyond : callable
-        What of a scene is beyond the validity of its rungs, as sentences.
+        Why a scene is beyond the validity of its rungs, as sentences.
     numerical : bool
-        As of :class:`Effect`.
+        See :class:`Effect`.
     """
     rows = tuple(rungs)
     return Effect(
@@ -235,14 +235,14 @@ def effect(
 
 
 def written(table: tuple[Rung, ...], paths: Iterable[str]) -> Iterator[Rung]:
-    """Rows of a table of rungs, each with the values that put it at the paths."""
+    """Rows of a table of rungs, each with the values that set it at the paths."""
     places = tuple(paths)
     for rung in table:
         yield replace(rung, values=dict.fromkeys(places, rung.name))
 
 
 STEP_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
-"""Factors on a step that is written; the last is the finest."""
+"""Factors on the step in the scene; the last is the finest."""
 
 
 def level_name(factor: float) -> str:
@@ -259,22 +259,22 @@ def level_name(factor: float) -> str:
 def levels(
     what: str, factors: Iterable[float], values: Callable[[float], Mapping[str, Any] | None]
 ) -> Iterator[Rung]:
-    """Levels of a numerical effect; a factor that cannot be written has none."""
+    """Levels of a numerical effect; a factor that cannot be set has no values."""
     for factor in factors:
         found = values(factor)
         if found is not None:
-            assumes = f"{what} of {factor:.3g} times what is written"
+            assumes = f"{what} of {factor:.3g} times the scene's value"
             yield Rung(name=level_name(factor), assumes=assumes, values=found)
 
 
 def whole_steps(
     path: str, scene: Scene, longest: float, fewest: int
 ) -> Callable[[float], Mapping[str, Any] | None]:
-    """Values of a step's levels: a step is a whole part of a sample, and so is each level.
+    """Values of a step's levels, each a whole fraction of a sample.
 
-    Halves are exact; twice and four times are rounded to the next whole number, and are left out
-    below the fewest steps of a sample or where they are none of their own. A level between two of
-    them is there only where it is exact.
+    Halves are exact. Twice and four times are rounded to the next whole number of steps, and are
+    omitted below the fewest steps per sample or where they repeat another level. An intermediate
+    level exists only if it is exact.
     """
     of_sample = math.ceil(1 / (scene.sample_rate * longest) - _ROUNDING)
 
@@ -292,5 +292,5 @@ def whole_steps(
 
 
 def as_written(_scene: Scene) -> str:
-    """Level of what is written."""
+    """Level of the scene's own value."""
     return level_name(1.0)

@@ -1,14 +1,14 @@
-"""Faults of how long and how often a machine is recorded, as sentences."""
+"""Checks of the length and sample rate of a recording; faults as sentences."""
 
 import math
 
 from .scene import Scene
 
-MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
+MEMORY = 4e9  # byte, limit of one run: a data set runs one per core
 
 
 def duration_faults(scene: Scene, revolution: float) -> list[str]:
-    """Fault of a recording shorter than a revolution [s]."""
+    """Find a recording shorter than one revolution [s]."""
     if scene.duration >= revolution:
         return []
     return [
@@ -18,7 +18,7 @@ def duration_faults(scene: Scene, revolution: float) -> list[str]:
 
 
 def tacho_faults(scene: Scene, revolution: float) -> list[str]:
-    """Fault of a tacho pulse shorter than two samples, by the time of a revolution [s]."""
+    """Find a tacho pulse shorter than two samples, given the time of a revolution [s]."""
     if not scene.tacho or scene.tacho.pulse_width / math.tau * revolution >= 2 / scene.sample_rate:
         return []
     return [
@@ -28,7 +28,7 @@ def tacho_faults(scene: Scene, revolution: float) -> list[str]:
 
 
 def memory_faults(scene: Scene, needed: float) -> list[str]:
-    """Fault of a recording that needs so many bytes."""
+    """Find a recording whose memory [byte] exceeds the limit."""
     if needed <= MEMORY:
         return []
     return [

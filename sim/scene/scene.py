@@ -1,7 +1,7 @@
-"""What every scene is: places of wear and conditions, channels, validation of a whole table.
+"""Base of all scenes: wear and condition quantities, channels, validation of a whole table.
 
-Validation reports every fault at once as a dotted path with value, bound and cure, and names the
-nearest match of an unknown key. Kernels trust what passes.
+Validation reports all faults together, each as a dotted path with value, bound and cure, and
+suggests the nearest match of an unknown key. Kernels trust validated scenes.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +28,7 @@ _SETTLING_MOST = 1000
 
 
 class SceneError(ValueError):
-    """Every fault of one scene, one line each, as dotted path, value, bound and cure."""
+    """All faults of one scene, one line each, as dotted path, value, bound and cure."""
 
     def __init__(self, name: str, faults: list[str]) -> None:
         self.faults = faults
@@ -36,19 +36,19 @@ class SceneError(ValueError):
 
 
 class Wear(Part):
-    """Limits of a clearance, all diametral, with their source."""
+    """Limits of a clearance, all diametral, and their source."""
 
     as_new_diametral: Length = Field(
         gt=0, le=LONGEST, description="smallest clearance of a new joint"
     )
     condemning_diametral: Length = Field(
-        gt=0, le=LONGEST, description="the joint must be renewed above it"
+        gt=0, le=LONGEST, description="clearance above which the joint must be renewed"
     )
     grade_edges_diametral: tuple[Length, Length, Length] = Field(
         description="clearance at which grades 1, 2 and 3 begin"
     )
     source: str = Field(
-        min_length=1, description="standard, maker or judgement that the limits come from"
+        min_length=1, description="origin of the limits: standard, maker or judgement"
     )
 
     @model_validator(mode="after")
@@ -83,25 +83,25 @@ class Wear(Part):
 
 
 class Numerics(Part):
-    """What the solver may be told; every field has a default that the scene decides."""
+    """Settings of the solver; the defaults depend on the scene."""
 
     step: Time | None = Field(default=None, ge=_STEP_LEAST, description="largest integration step")
 
 
 class WearPlace(NamedTuple):
-    """A value of a scene that says how worn the machine is [m]."""
+    """Wear quantity of a scene [m]."""
 
     path: str
-    """Dotted; ``*`` stands for the number of a list entry, counted from 0."""
+    """Dotted path; ``*`` stands for the index of a list entry, counted from 0."""
     place: str
-    """What is worn; ``{}`` stands for that number counted from 1, as people count throws."""
+    """Worn part; ``{}`` stands for that index counted from 1, as throws are counted."""
     words: str
     limits: str = ""
-    """Table of the scene with its limits; a severity without any has no grade."""
+    """Table of the scene with its limits; without limits a severity has no grade."""
 
     @property
     def kind(self) -> str:
-        """What its columns begin with: the value's own name."""
+        """Beginning of its column names: the last key of its path."""
         return self.path.rpartition(".")[2]
 
     @property
@@ -111,16 +111,16 @@ class WearPlace(NamedTuple):
 
 
 class ConditionPlace(NamedTuple):
-    """A value of a scene that is an operating condition [SI]."""
+    """Operating condition of a scene [SI]."""
 
     path: str
     column: str
-    """Manifest column; ends in its unit."""
+    """Manifest column; ends in the unit."""
     words: str
 
 
 SPEED = ConditionPlace("drive.speed", "speed_hz", "shaft speed, as set")
-"""Condition that every machine has."""
+"""Condition of every machine."""
 
 START_ANGLE = ConditionPlace(
     "drive.start_angle", "start_angle_rad", "shaft angle at the first sample"
@@ -132,21 +132,21 @@ VISCOSITY = ConditionPlace(
 
 
 class Scene(Part):
-    """What every machine's scene holds.
+    """Base of every machine's scene.
 
-    With ``fidelity = "auto"`` the rungs and the numerics written in a scene are replaced by the
-    cheapest that keep to ``accuracy``, but for the effects that ``pinned`` names.
+    With ``fidelity = "auto"`` the rungs and numerics written in a scene are replaced by the
+    cheapest that meet ``accuracy``, except for the effects in ``pinned``.
 
     A machine's scene is a subclass, one row of :data:`.scene.load.MACHINES`. Its class variables
-    are what the program must know of the machine without its physics.
+    describe the machine without its physics.
 
     Attributes
     ----------
     physics : str
         Module with ``MACHINE``, a :class:`wearstate.sim.machine.registry.MachinePhysics`. It is
-        named, so that a scene is read without kernels.
+        given by name, so that a scene can be read without loading kernels.
     effects : tuple of str
-        As ``pinned`` names them.
+        Names of the effects, as used in ``pinned``.
     wear_places : tuple of WearPlace
     condition_places : tuple of ConditionPlace
     """
@@ -156,24 +156,25 @@ class Scene(Part):
     wear_places: ClassVar[tuple[WearPlace, ...]] = ()
     condition_places: ClassVar[tuple[ConditionPlace, ...]] = (SPEED,)
 
-    name: str = Field(min_length=1, description="of the scene, kept with every recording")
+    name: str = Field(min_length=1, description="name of the scene, kept with every recording")
     machine: str
-    description: str = Field(default="", description="one sentence for lists")
+    description: str = Field(default="", description="one sentence, for lists")
     duration: Time = Field(
         gt=0, le=_RECORDING_LONGEST, description="length of the recording, after settling"
     )
     sample_rate: Frequency = Field(
-        ge=SIMULATED_RATE_LEAST, le=SIMULATED_RATE_MOST, description="of every channel"
+        ge=SIMULATED_RATE_LEAST, le=SIMULATED_RATE_MOST, description="sample rate of every channel"
     )
     settling_revolutions: int = Field(
-        default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
+        default=3, ge=1, le=_SETTLING_MOST, description="revolutions before the recording"
     )
-    accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
+    accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="largest error of the features")
     fidelity: Literal["given", "auto"] = Field(
-        default="given", description="rungs and numerics as written, or as the accuracy needs"
+        default="given",
+        description="given: rungs and numerics of the scene; auto: the cheapest that are accurate",
     )
     pinned: tuple[str, ...] = Field(
-        default=(), description="effects that stay as they are written whatever the fidelity"
+        default=(), description="effects that fidelity = 'auto' does not change"
     )
     tacho: Tacho | None = Tacho()
     numerics: Numerics = Numerics()
@@ -187,7 +188,7 @@ class Scene(Part):
         return self
 
     def __repr__(self) -> str:
-        """Machine, name and what a recording of it is."""
+        """Machine, name and extent of a recording."""
         rate = self.sample_rate
         told = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
         return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {told}>"
@@ -195,28 +196,28 @@ class Scene(Part):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        """The same for notebooks, and its parts."""
+        """The same for notebooks, with the scene's parts."""
         parts = {name: short(getattr(self, name)) for name in type(self).model_fields}
         rows = [(name, text) for name, text in parts.items() if text]
         return html_table(repr(self)[1:-1], ["part", ""], rows)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
-        """Channels of the sensors, in order; every machine has its own."""
+        """Channels of the sensors, in order; each machine has its own."""
         raise NotImplementedError(self.machine)
 
     def sensor_parts(self) -> tuple[Any, ...]:
-        """Sensors that have a range and a noise, one for each of their channels, in order."""
+        """Sensors with a range and a noise, one for each sensor channel, in order."""
         raise NotImplementedError(self.machine)
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
-        """Faults between parts, of those parts that are there; each machine has its own."""
+        """Faults between those parts that are present; each machine has its own."""
         del parts
         return []
 
 
 def machine_name(kind: type[Scene]) -> str:
-    """What the scenes of a type write as their machine.
+    """Name of a scene type in its ``machine`` key.
 
     Examples
     --------
@@ -228,7 +229,7 @@ def machine_name(kind: type[Scene]) -> str:
 
 
 def pinned_faults(kind: type[Scene], pinned: Sequence[str]) -> list[str]:
-    """Names that are no effects of a type of scene, as sentences.
+    """Pinned names that are no effects of a type of scene, as sentences.
 
     Examples
     --------
@@ -262,7 +263,7 @@ def channels_of(scene: Scene) -> tuple[Channel, ...]:
 def faults_between(
     parts: Mapping[str, Any], checks: Sequence[tuple[Callable[..., list[str]], tuple[str, ...]]]
 ) -> list[str]:
-    """Faults between parts, by those checks whose parts are all there."""
+    """Faults between parts, from those checks whose parts are all present."""
     return [
         fault
         for check, needs in checks
@@ -288,16 +289,16 @@ def name_faults(sensors: Sequence[str], tacho: Tacho | None) -> list[str]:
 
 
 MOST_FAULTS = 200
-"""Faults of one input that are told one by one."""
+"""Number of faults of one input that are listed individually."""
 
 
 def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:
-    """Validate a plain table into any model, with every fault in the words of this program.
+    """Validate a plain table into any model, and report all faults in this program's words.
 
     Raises
     ------
     SceneError
-        Every fault at once, each as dotted path, value, bound and cure.
+        All faults together, each as dotted path, value, bound and cure.
 
     Examples
     --------
@@ -313,7 +314,7 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
         faults = [
             line
             for entry in entries
-            # a list all of whose entries are at fault is called too short as well
+            # a list whose entries are all at fault is reported as too short as well
             if not any(place[:-1][: len(entry["loc"])] == entry["loc"] for place in places)
             or entry["type"] != "too_short"
             for line in fault_lines(model, entry)
@@ -328,14 +329,14 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
 
 
 def _other_choice(entry: Any) -> bool:
-    """The text or boolean member of a union: its number has been reported already."""
+    """Whether this is another member of a union whose number has been reported already."""
     return entry["loc"][-1:] in (("str",), ("bool",)) and entry["type"].startswith(
         ("string_", "bool_")
     )
 
 
 def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Parts of a faulty table that are valid on their own, defaults included."""
+    """Parts of a faulty table that are valid on their own, including defaults."""
     parts = {}
     for name, field in model.model_fields.items():
         if name not in table:

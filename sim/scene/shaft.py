@@ -1,4 +1,4 @@
-"""A propulsion shaft on its bearings as a scene, and what is wrong with its parts together."""
+"""A propulsion shaft on its bearings as a scene, and the checks between its parts."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -45,19 +45,17 @@ from .shaft_parts import (
     Turbulence,
 )
 
-_LOOSEST_FIT = 0.05  # of the diameter: bore and shaft are one but for the clearance
+_LOOSEST_FIT = 0.05  # of the diameter: bore and shaft are equal except for the clearance
 
 
 class ShaftScene(Scene):
-    """A propulsion shaft on its bearings, seen on its housings and by proximity probes."""
+    """A propulsion shaft on its bearings, measured on the housings and by proximity probes."""
 
     physics = "wearstate.sim.machine.shaft"
     effects = ("film", "beam", "elements", "mesh")
     wear_places = (
-        WearPlace(
-            "bearings.*.wear_down", "bearing_{}", "how far the bore has worn down", "wear_down"
-        ),
-        WearPlace("bearings.*.sag", "bearing_{}", "how far the foundation has sunk", "wear_sag"),
+        WearPlace("bearings.*.wear_down", "bearing_{}", "wear-down of the bore", "wear_down"),
+        WearPlace("bearings.*.sag", "bearing_{}", "sag of the foundation", "wear_sag"),
         WearPlace(
             "coupling.parallel_offset",
             "coupling",
@@ -76,14 +74,14 @@ class ShaftScene(Scene):
         ConditionPlace(
             "bearings.0.film_warming",
             "film_warming_k",
-            "how much warmer the film of the first bearing is than the oil",
+            "temperature of the first bearing's film above the oil",
         ),
     )
 
     machine: Literal["propulsion-shaft"] = Field(description="propulsion-shaft")
     gravity: Gravity = STANDARD_GRAVITY
     settling_revolutions: int = Field(
-        default=0, ge=0, le=1000, description="unused: the response is the settled one"
+        default=0, ge=0, le=1000, description="unused: the response is in steady state"
     )
     drive: ShaftDrive
     shaft: ShaftMaterial
@@ -109,11 +107,11 @@ class ShaftScene(Scene):
 
     @property
     def length(self) -> float:
-        """Of the whole shaft [m]."""
+        """Length of the whole shaft [m]."""
         return math.fsum(section.length for section in self.sections)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
-        """Accelerations of the housings, a displacement for every probe, then the test forces."""
+        """Accelerations of the housings, displacements of the probes, then the test forces."""
         accelerations = tuple(
             acceleration_channel(
                 sensor.name, f"housing of {sensor.bearing}", DIRECTIONS[sensor.direction]
@@ -138,12 +136,12 @@ class ShaftScene(Scene):
 
     @property
     def mounted_exciters(self) -> tuple[ShaftExciter, ...]:
-        """Those that push; the others are not there."""
+        """Exciters that act; unmounted ones are ignored."""
         return tuple(part for part in self.exciters if part.mounted)
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
-        """Faults between parts, of those parts that are there."""
+        """Faults between those parts that are present."""
         return faults_between(parts, _CHECKS)
 
 
@@ -219,7 +217,7 @@ def _bearing_faults(
 
 
 def _diameters(sections: tuple[ShaftSection, ...], station: float) -> list[float]:
-    """Outer diameters at a station, two where sections meet."""
+    """Outer diameters at a station; two where sections meet."""
     found, start = [], 0.0
     for section in sections:
         end = start + section.length
@@ -270,7 +268,7 @@ def _warming_faults(oil: Oil, bearings: tuple[ShaftBearing, ...]) -> list[str]:
         return []
     return [
         f"bearings.{i}.film_warming = {bearing.film_warming:g} K must be 0 with oil.viscosity, "
-        "which says nothing of other temperatures; give oil.temperature, viscosity_40, "
+        "which is valid at one temperature; give oil.temperature, viscosity_40, "
         "viscosity_100 and density instead"
         for i, bearing in enumerate(bearings)
         if bearing.film_warming
@@ -317,13 +315,13 @@ def _film_faults(film: Film) -> list[str]:
     faults = []
     if film.rung != "direct":
         faults.append(
-            f"film.rung = '{film.rung}' knows no tilted journal; set film.rung = 'direct' for a "
+            f"film.rung = '{film.rung}' is for an aligned journal; set film.rung = 'direct' for a "
             "shaft line"
         )
     if film.condition == "reynolds":
         faults.append(
             "film.condition = 'reynolds' must be 'periodic' or 'guembel'; it holds P = 0 on the "
-            "line of nodes at the widest gap, of which a tilted journal has no one; 'periodic' "
+            "line of nodes at the widest gap, which is not unique for a tilted journal; 'periodic' "
             "ruptures the film by the same law and finds the line itself"
         )
     return faults
@@ -342,4 +340,4 @@ _CHECKS: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (_exciter_faults, ("sections", "bearings", "discs", "exciters")),
     (_film_faults, ("film",)),
 )
-"""Checks between parts, and the parts that each needs. A new one is one row."""
+"""Checks between parts, and the parts that each needs. A new check is one row."""

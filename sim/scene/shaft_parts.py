@@ -1,7 +1,7 @@
-"""The parts of a propulsion shaft: sections, bearings, loads, what excites it, its sensors.
+"""Parts of a propulsion shaft: sections, bearings, loads, excitation, sensors.
 
-x points along the shaft from aft, the propeller, forward, and a station is the distance in it
-from the aft end; y points up and z to starboard. The shaft turns from y towards z. Heights and
+x points along the shaft from aft, the propeller, forward; a station is the distance in x
+from the aft end. y points up and z to starboard. The shaft turns from y towards z. Heights and
 offsets are positive up, sags and wear-down positive downwards.
 """
 
@@ -51,12 +51,12 @@ _UNBALANCE_MOST = 1e6  # kg m
 _MODULUS_LEAST, _MODULUS_MOST = 1e8, 1e13  # Pa, from rubber to beyond diamond
 _DENSITY_MOST = 3e4  # kg/m^3, beyond osmium
 _STEEPEST = 0.05  # rad: small angles are their sines to 0.04 %
-_THINNEST = 1e-6  # m, of a clearance of a shaft line: a micrometre
+_THINNEST = 1e-6  # m, smallest clearance of a shaft line: a micrometre
 _NOISIEST = 1e7  # m/s^2
 _LEAST_RANGE, _MOST_RANGE = 1e-9, 1e7  # m/s^2
-_HULL_FASTEST = 1.0  # m/s: a hundred times what people on board would bear
+_HULL_FASTEST = 1.0  # m/s: a hundred times what people on board tolerate
 _HULL_SHARE_MOST = 10.0  # a floor in resonance
-_WARMEST_FILM = 100.0  # K over the oil: white metal melts first
+_WARMEST_FILM = 100.0  # K above the oil: white metal melts first
 
 MOST_PARTS = 200
 _MOST_BLADES = 20
@@ -75,29 +75,30 @@ _Name = Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)]
 
 
 class ShaftDrive(Part):
-    """How the shaft is turned."""
+    """Drive of the shaft."""
 
-    speed: RotationSpeed = Field(gt=0, le=1000, description="constant")
+    speed: RotationSpeed = Field(gt=0, le=1000, description="shaft speed, constant")
     start_angle: _Phase = Field(default=0.0, description="shaft angle at the first sample")
 
 
 class ShaftMaterial(Part):
-    """What the shaft is of, and how its beam is computed."""
+    """Material of the shaft, and its beam theory."""
 
     theory: Literal["timoshenko", "euler-bernoulli"] = Field(
         default="timoshenko",
         description="timoshenko: with shear and rotary inertia; euler-bernoulli: without",
     )
     shear_coefficient: Ratio | Literal["cowper"] = Field(
-        default="cowper", description="of the Timoshenko beam: a number, or Cowper's formula"
+        default="cowper",
+        description="coefficient of the Timoshenko beam: a number, or Cowper's formula",
     )
     young: Pressure = Field(
         ge=_MODULUS_LEAST, le=_MODULUS_MOST, description="modulus of elasticity"
     )
     shear_modulus: Pressure = Field(
-        ge=_MODULUS_LEAST, le=_MODULUS_MOST, description="of the material"
+        ge=_MODULUS_LEAST, le=_MODULUS_MOST, description="shear modulus of the material"
     )
-    density: Density = Field(gt=0, le=_DENSITY_MOST, description="of the material")
+    density: Density = Field(gt=0, le=_DENSITY_MOST, description="density of the material")
     damping_ratio: Ratio = Field(
         default=0.0, ge=0, lt=1, description="structural damping of the shaft's bending modes"
     )
@@ -105,7 +106,7 @@ class ShaftMaterial(Part):
         default=(2.0, 200.0), description="two frequencies at which the damping ratio holds"
     )
     longest_element: Length = Field(
-        gt=0, le=LONGEST, description="of the beam mesh; shorter is finer"
+        gt=0, le=LONGEST, description="longest element of the beam mesh"
     )
 
     @model_validator(mode="after")
@@ -119,12 +120,12 @@ class ShaftMaterial(Part):
 
 
 class ShaftSection(Part):
-    """A piece of shaft of one diameter; sections follow each other from aft."""
+    """A piece of shaft with one diameter; sections are listed from aft."""
 
-    length: Length = Field(gt=0, le=LONGEST, description="along the line")
-    outer_diameter: Length = Field(gt=0, le=LONGEST, description="of this section")
+    length: Length = Field(gt=0, le=LONGEST, description="length along the line")
+    outer_diameter: Length = Field(gt=0, le=LONGEST, description="outer diameter of this section")
     inner_diameter: Length = Field(
-        default=0.0, ge=0, le=LONGEST, description="of its bore; 0 is solid"
+        default=0.0, ge=0, le=LONGEST, description="bore diameter; 0: solid"
     )
 
     @model_validator(mode="after")
@@ -140,20 +141,20 @@ class ShaftSection(Part):
 class ShaftDisc(Part):
     """A mass on the shaft: propeller, flange, coupling half, gear.
 
-    Entrained water has inertia and neither weight nor spin.
+    Entrained water has inertia but no weight and does not spin.
     """
 
-    name: _Name = Field(description="by which exciters and results refer to it")
+    name: _Name = Field(description="name used by exciters and results")
     station: _Station = Field(description="distance from the aft end of the line")
-    mass: Mass = Field(ge=0, le=HEAVIEST, description="in air")
+    mass: Mass = Field(ge=0, le=HEAVIEST, description="mass in air")
     polar_inertia: Inertia = Field(
-        default=0.0, ge=0, le=INERTIA_MOST, description="about the shaft"
+        default=0.0, ge=0, le=INERTIA_MOST, description="inertia about the shaft"
     )
     diametral_inertia: Inertia = Field(
-        default=0.0, ge=0, le=INERTIA_MOST, description="about a diameter"
+        default=0.0, ge=0, le=INERTIA_MOST, description="inertia about a diameter"
     )
     entrained_mass: Mass = Field(
-        default=0.0, ge=0, le=HEAVIEST, description="of water that moves with it"
+        default=0.0, ge=0, le=HEAVIEST, description="mass of water that moves with it"
     )
     entrained_polar: Inertia = Field(
         default=0.0, ge=0, le=INERTIA_MOST, description="inertia of that water about the shaft"
@@ -174,95 +175,119 @@ class ShaftLoad(Part):
     """A steady load at a station."""
 
     station: _Station = Field(description="distance from the aft end of the line")
-    up: _Load = Field(default=0.0, description="negative is downward")
-    side: _Load = Field(default=0.0, description="horizontal")
-    moment_up: _Turning = Field(default=0.0, description="to the slope dy/dx")
-    moment_side: _Turning = Field(default=0.0, description="to the slope dz/dx")
+    up: _Load = Field(default=0.0, description="vertical force; negative is downward")
+    side: _Load = Field(default=0.0, description="horizontal force")
+    moment_up: _Turning = Field(default=0.0, description="moment that increases the slope dy/dx")
+    moment_side: _Turning = Field(default=0.0, description="moment that increases the slope dz/dx")
 
 
 # --- bearings
 
 
 class Housing(Part):
-    """The bearing's housing on its pedestal: a mass on two springs with their dampers."""
+    """Housing of a bearing on its pedestal: a mass on two springs with their dampers."""
 
-    mass: Mass = Field(gt=0, le=HEAVIEST, description="that moves with the bearing")
-    stiffness_up: Stiffness = Field(gt=0, le=STIFFEST, description="of the pedestal, vertically")
+    mass: Mass = Field(gt=0, le=HEAVIEST, description="mass that moves with the bearing")
+    stiffness_up: Stiffness = Field(gt=0, le=STIFFEST, description="pedestal stiffness, vertical")
     stiffness_side: Stiffness = Field(
-        gt=0, le=STIFFEST, description="of the pedestal, horizontally"
+        gt=0, le=STIFFEST, description="pedestal stiffness, horizontal"
     )
     damping_up: Damping = Field(
-        default=0.0, ge=0, le=DAMPING_MOST, description="of the pedestal, vertically"
+        default=0.0, ge=0, le=DAMPING_MOST, description="pedestal damping, vertical"
     )
     damping_side: Damping = Field(
-        default=0.0, ge=0, le=DAMPING_MOST, description="of the pedestal, horizontally"
+        default=0.0, ge=0, le=DAMPING_MOST, description="pedestal damping, horizontal"
     )
     hull_share_up: _HullShare = Field(
-        default=1.0, description="of the hull's vibration that its foundation has, vertically"
+        default=1.0, description="foundation's share of the hull vibration, vertical"
     )
     hull_share_side: _HullShare = Field(
-        default=1.0, description="of the hull's vibration that its foundation has, horizontally"
+        default=1.0, description="foundation's share of the hull vibration, horizontal"
     )
 
 
 class AlignmentLimits(Part):
-    """What a bearing may carry, and how far it may be moved; see where each is from in `source`."""
+    """Limits of a bearing's load and of its adjustment; `source` gives their origin."""
 
     least_load: Force = Field(
-        default=0.0, ge=0, le=FORCE_MOST, description="below which the bearing counts as unloaded"
+        default=0.0,
+        ge=0,
+        le=FORCE_MOST,
+        description="load below which the bearing counts as unloaded",
     )
     most_pressure: Pressure | None = Field(
-        default=None, gt=0, le=PRESSURE_MOST, description="load over length times diameter"
+        default=None, gt=0, le=PRESSURE_MOST, description="largest load over length times diameter"
     )
     most_slope: Angle | None = Field(
-        default=None, gt=0, le=_STEEPEST, description="of the shaft in the bore, in this plane"
+        default=None,
+        gt=0,
+        le=_STEEPEST,
+        description="largest slope of the shaft in the bore, in this plane",
     )
-    least_move: Length = Field(default=0.0, ge=-1.0, le=0, description="the furthest down")
-    most_move: Length = Field(default=0.0, ge=0, le=1.0, description="the furthest up")
+    least_move: Length = Field(default=0.0, ge=-1.0, le=0, description="lowest adjustment, <= 0")
+    most_move: Length = Field(default=0.0, ge=0, le=1.0, description="highest adjustment")
     source: str = Field(
-        default="", description="standard, maker or judgement that the limits come from"
+        default="", description="origin of the limits: standard, maker or judgement"
     )
 
 
 class ShaftBearing(Part):
-    """A journal bearing of the line, its place and its state.
+    """A journal bearing of the line, its position and its state.
 
-    ``offset`` is the height of the journal's centre where it lies at the bottom of the bore, as
-    aligned and as new. Wear-down lowers the bottom of the bore: the bore stays a circle and gets
-    wider by as much, or keeps its circle but for an arc below. A sag lowers the bearing.
+    ``offset`` is the height of the journal's centre when it lies at the bottom of the bore, as
+    aligned and new. Wear-down lowers the bottom of the bore: the bore stays a circle and gets
+    wider by the same amount, or keeps its circle except for an arc at the bottom. A sag lowers the
+    bearing.
     """
 
-    name: _Name = Field(description="by which sensors, probes and tests refer to it")
-    station: _Station = Field(description="of its middle, from the aft end of the line")
-    diameter: Length = Field(gt=0, le=LONGEST, description="of the bore")
-    length: Length = Field(gt=0, le=LONGEST, description="of the bore")
-    diametral_clearance: Length = Field(ge=_THINNEST, description="as new, bore minus journal")
-    offset: _Height = Field(default=0.0, description="height of its centre over the reference line")
-    side_offset: _Height = Field(default=0.0, description="of its centre beside the reference line")
-    slope: _Slope = Field(default=0.0, description="of the bore, dy/dx")
-    side_slope: _Slope = Field(default=0.0, description="of the bore, dz/dx")
-    wear_down: Length = Field(default=0.0, ge=0, le=1.0, description="of the bottom of the bore")
+    name: _Name = Field(description="name used by sensors, probes and tests")
+    station: _Station = Field(description="position of its middle, from the aft end of the line")
+    diameter: Length = Field(gt=0, le=LONGEST, description="bore diameter")
+    length: Length = Field(gt=0, le=LONGEST, description="bore length")
+    diametral_clearance: Length = Field(
+        ge=_THINNEST, description="clearance as new, bore minus journal"
+    )
+    offset: _Height = Field(
+        default=0.0, description="height of its centre above the reference line"
+    )
+    side_offset: _Height = Field(
+        default=0.0, description="horizontal distance of its centre from the reference line"
+    )
+    slope: _Slope = Field(default=0.0, description="slope of the bore, dy/dx")
+    side_slope: _Slope = Field(default=0.0, description="slope of the bore, dz/dx")
+    wear_down: Length = Field(
+        default=0.0, ge=0, le=1.0, description="wear of the bottom of the bore"
+    )
     worn_shape: Literal["circle", "arc"] = Field(
-        default="circle", description="of the worn bore: a wider circle, or an arc below"
+        default="circle",
+        description="shape of the worn bore: a wider circle, or an arc at the bottom",
     )
     arc_clearance: Ratio = Field(
-        default=0.5, ge=0.05, le=1, description="of the journal in the arc, over the bore's as new"
+        default=0.5,
+        ge=0.05,
+        le=1,
+        description="clearance of the journal in the arc, over the bore's as new",
     )
     groove_width: Angle = Field(
-        default=0.0, ge=0, lt=math.pi / 2, description="of an axial groove at either side; 0: none"
+        default=0.0,
+        ge=0,
+        lt=math.pi / 2,
+        description="width of an axial groove at either side; 0: none",
     )
-    sag: Length = Field(default=0.0, ge=0, le=1.0, description="downwards, from its offset")
+    sag: Length = Field(default=0.0, ge=0, le=1.0, description="sag below its offset")
     film_warming: Temperature = Field(
         default=0.0,
         ge=0,
         le=_WARMEST_FILM,
-        description="how much warmer its film is than the oil; needs oil.temperature",
+        description="film temperature above that of the oil; needs oil.temperature",
     )
-    rise: _Height = Field(default=0.0, description="of the bearing, once it is hot")
+    rise: _Height = Field(default=0.0, description="rise of the bearing when hot")
     lift: Length = Field(
-        default=0.0, ge=0, le=1.0, description="of the journal on its film, on rigid supports"
+        default=0.0, ge=0, le=1.0, description="lift of the journal on its film, for rigid supports"
     )
-    points: int = Field(default=1, ge=1, le=9, description="support points along its length")
+    points: int = Field(
+        default=1, ge=1, le=9, description="number of support points along its length"
+    )
     housing: Housing
     limits: AlignmentLimits = AlignmentLimits()
 
@@ -272,7 +297,7 @@ class ShaftBearing(Part):
         if gap >= self.diameter / 10:
             raise ValueError(
                 f"diametral_clearance + wear_down = {gap:g} m must be < a tenth of the bore "
-                f"(diameter = {self.diameter:g} m), the film theory knows no curvature; check the "
+                f"(diameter = {self.diameter:g} m), the film theory neglects curvature; check the "
                 "unit"
             )
         if self.lift > self.diametral_clearance / 2:
@@ -284,66 +309,75 @@ class ShaftBearing(Part):
 
 
 class _HullTone(Part):
-    """A tone of the hull: the velocity ``up cos(angle + up_phase)``, and so to the side.
+    """A tone of the hull: the velocity ``up cos(angle + up_phase)``, and likewise to the side.
 
-    Every foundation has its share of it, in step with all others or against them.
+    Every foundation has a share of it, in phase with all others or in antiphase.
     """
 
-    up: _HullSpeed = Field(default=0.0, description="amplitude of the velocity, vertically")
-    side: _HullSpeed = Field(default=0.0, description="amplitude of the velocity, horizontally")
-    up_phase: _Phase = Field(default=0.0, description="of the vertical velocity")
-    side_phase: _Phase = Field(default=0.0, description="of the horizontal velocity")
+    up: _HullSpeed = Field(default=0.0, description="amplitude of the vertical velocity")
+    side: _HullSpeed = Field(default=0.0, description="amplitude of the horizontal velocity")
+    up_phase: _Phase = Field(default=0.0, description="phase of the vertical velocity")
+    side_phase: _Phase = Field(default=0.0, description="phase of the horizontal velocity")
 
 
 class HullBladeTone(_HullTone):
-    """What the propeller's pressure makes the hull do at a harmonic of the blade rate."""
+    """Hull vibration from the propeller's pressure, at a harmonic of the blade rate."""
 
-    harmonic: int = Field(ge=1, le=100, description="of the blade rate")
+    harmonic: int = Field(ge=1, le=100, description="harmonic of the blade rate")
 
 
 class EngineTone(_HullTone):
-    """What an engine beside the line makes the hull do at an order of its speed."""
+    """Hull vibration from a separate engine, at an order of its speed."""
 
-    order: Ratio = Field(gt=0, le=100, description="of the engine's speed; 0.5 is a working cycle")
+    order: Ratio = Field(
+        gt=0, le=100, description="order of the engine's speed; 0.5: one per working cycle"
+    )
 
 
 class HullEngine(Part):
-    """An engine that runs beside the line, as a generating set; it keeps its own time."""
+    """An engine independent of the line, such as a generating set, with its own speed and phase."""
 
-    speed: RotationSpeed = Field(gt=0, le=1000, description="constant")
+    speed: RotationSpeed = Field(gt=0, le=1000, description="engine speed, constant")
     tones: tuple[EngineTone, ...] = Field(
-        default=(), max_length=MOST_PARTS, description="of the hull, by orders of this speed"
+        default=(), max_length=MOST_PARTS, description="hull vibration, by orders of this speed"
     )
 
 
 class Hull(Part):
-    """What the hull does under the bearings.
+    """Motion of the hull under the bearings.
 
-    It bends under its cargo, a parabola between first and last bearing, and shakes their pedestals.
+    Cargo bends it, in a parabola between first and last bearing; vibration shakes the pedestals.
     """
 
     deflection: _Height = Field(
-        default=0.0, description="of the middle above the line through first and last bearing"
+        default=0.0,
+        description="height of the middle above the line through first and last bearing",
     )
     blade_tones: tuple[HullBladeTone, ...] = Field(
         default=(), max_length=MOST_PARTS, description="vibration at the blade rate"
     )
     engines: tuple[HullEngine, ...] = Field(
-        default=(), max_length=MOST_PARTS, description="whose vibration reaches the bearings"
+        default=(),
+        max_length=MOST_PARTS,
+        description="engines whose vibration reaches the bearings",
     )
 
 
 class ShaftCondition(Part):
-    """A state for which the alignment must hold."""
+    """A state in which the alignment must hold."""
 
-    hull_deflection: _Height | None = Field(default=None, description="by default hull.deflection")
-    rise_share: Ratio = Field(default=0.0, ge=0, le=1, description="of the bearings' rise")
-    lift_share: Ratio = Field(default=0.0, ge=0, le=1, description="of the journals' lift")
-    thrust_share: Ratio = Field(default=0.0, ge=0, le=1, description="of the propeller's thrust")
+    hull_deflection: _Height | None = Field(
+        default=None, description="hull deflection; none: hull.deflection"
+    )
+    rise_share: Ratio = Field(default=0.0, ge=0, le=1, description="share of the bearings' rise")
+    lift_share: Ratio = Field(default=0.0, ge=0, le=1, description="share of the journals' lift")
+    thrust_share: Ratio = Field(
+        default=0.0, ge=0, le=1, description="share of the propeller's thrust"
+    )
 
 
 class ShaftConditions(Part):
-    """The three states of an alignment calculation."""
+    """Three states of an alignment calculation."""
 
     cold: ShaftCondition = ShaftCondition()
     hot: ShaftCondition = ShaftCondition(rise_share=1.0)
@@ -360,7 +394,7 @@ class BladeRate(Part):
     cos(order * angle + phase)``, and turns with a moment of ``share * thrust * diameter``.
     """
 
-    harmonic: int = Field(ge=1, le=100, description="of the blade rate")
+    harmonic: int = Field(ge=1, le=100, description="harmonic of the blade rate")
     up: Ratio = Field(default=0.0, ge=0, le=1, description="vertical force, over the mean thrust")
     side: Ratio = Field(
         default=0.0, ge=0, le=1, description="horizontal force, over the mean thrust"
@@ -374,83 +408,88 @@ class BladeRate(Part):
         le=1,
         description="moment that bends sideways, over thrust times diameter",
     )
-    up_phase: _Phase = Field(default=0.0, description="of the vertical force and moment")
-    side_phase: _Phase = Field(default=0.0, description="of the horizontal force and moment")
+    up_phase: _Phase = Field(default=0.0, description="phase of the vertical force and moment")
+    side_phase: _Phase = Field(default=0.0, description="phase of the horizontal force and moment")
 
 
 class Propeller(Part):
-    """What the propeller does to the shaft besides its weight."""
+    """Propeller forces on the shaft, in addition to its weight."""
 
     disc: _Name = Field(description="name of the disc that is the propeller")
     blades: int = Field(ge=1, le=_MOST_BLADES, description="number of blades")
-    diameter: Length = Field(gt=0, le=LONGEST, description="of the blade tips")
-    thrust: Force = Field(ge=0, le=FORCE_MOST, description="forward")
+    diameter: Length = Field(gt=0, le=LONGEST, description="diameter of the blade tips")
+    thrust: Force = Field(ge=0, le=FORCE_MOST, description="thrust, forward")
     thrust_height: _Height = Field(
         default=0.0, description="of the thrust's line of action above the shaft"
     )
-    thrust_side: _Height = Field(default=0.0, description="of the same to starboard")
+    thrust_side: _Height = Field(default=0.0, description="offset of that line to starboard")
     blade_rate: tuple[BladeRate, ...] = Field(
         default=(),
         max_length=MOST_PARTS,
-        description="harmonics of the blade rate, the first first",
+        description="harmonics of the blade rate, in rising order",
     )
 
 
 class Coupling(Part):
     """A flexible coupling at one end of the line, its other half misaligned.
 
-    Its elements sit on a ring and are not all alike: their stiffness has a first and a second
-    harmonic round the ring. Turning, a misaligned ring pushes steadily and at twice the speed, and
-    a ring that carries a torque at the speed.
+    Its elements sit on a ring and differ: their stiffness has a first and a second harmonic round
+    the ring. As it turns, a misaligned ring exerts a steady force and one at twice the speed; a
+    ring that carries a torque exerts a force at the speed.
     """
 
     station: _Station = Field(description="distance from the aft end of the line")
     parallel_offset: Length = Field(
-        default=0.0, ge=0, le=1.0, description="of the other half's axis, along offset_angle"
+        default=0.0, ge=0, le=1.0, description="offset of the other half's axis, along offset_angle"
     )
-    offset_angle: _Phase = Field(default=0.0, description="from up towards starboard")
+    offset_angle: _Phase = Field(
+        default=0.0, description="direction of the offset, from up towards starboard"
+    )
     angle: Annotated[Angle, Field(ge=-_STEEPEST, le=_STEEPEST)] = Field(
-        default=0.0, description="of the other half's axis, dy/dx"
+        default=0.0, description="slope of the other half's axis, dy/dx"
     )
-    stiffness: Stiffness = Field(gt=0, le=STIFFEST, description="to a parallel offset")
+    stiffness: Stiffness = Field(gt=0, le=STIFFEST, description="stiffness against parallel offset")
     bending_stiffness: Moment = Field(
-        default=0.0, ge=0, le=_MOMENT_MOST, description="to an angle, per radian"
+        default=0.0, ge=0, le=_MOMENT_MOST, description="stiffness against angle, per radian"
     )
-    torque: Moment = Field(default=0.0, ge=0, le=_MOMENT_MOST, description="carried")
-    ring_radius: Length = Field(gt=0, le=LONGEST, description="of the elements")
+    torque: Moment = Field(default=0.0, ge=0, le=_MOMENT_MOST, description="torque carried")
+    ring_radius: Length = Field(gt=0, le=LONGEST, description="radius of the ring of elements")
     uneven_once: Ratio = Field(
         default=0.0, ge=0, lt=1, description="first harmonic of the elements' stiffness"
     )
     uneven_twice: Ratio = Field(
         default=0.0, ge=0, lt=1, description="second harmonic of the elements' stiffness"
     )
-    uneven_phase: _Phase = Field(default=0.0, description="of the stiffest element at angle 0")
+    uneven_phase: _Phase = Field(
+        default=0.0, description="position of the stiffest element at angle 0"
+    )
 
 
 class Turbulence(Part):
-    """A random force, flat up to a corner, then falling by 6 dB an octave.
+    """A random force, flat up to a corner frequency, then falling by 6 dB per octave.
 
-    Its density is ``2 force^2 / (pi corner) / (1 + (f / corner)^2)``, in both directions,
-    independently.
+    Its spectral density is ``2 force^2 / (pi corner) / (1 + (f / corner)^2)``, independent in the
+    two directions.
     """
 
     place: _Name = Field(description="name of a disc or of a bearing, whose housing it pushes")
     force: Force = Field(ge=0, le=FORCE_MOST, description="rms over all frequencies")
-    corner: Frequency = Field(gt=0, le=1e6, description="above which the force falls")
+    corner: Frequency = Field(gt=0, le=1e6, description="frequency above which the force falls")
 
 
 class ShaftExciter(PlacedExciter):
     """A shaker or hammer on the shaft or on a bearing's housing, while the line runs.
 
-    At rest the journals lie on metal, of which the model knows nothing: there is no test at
-    standstill.
+    No test at standstill is modelled: the journals would then lie on metal.
     """
 
     place: str = Field(
         default="", max_length=NAME_LONGEST, description="name of a bearing or a disc"
     )
-    station: _Station | None = Field(default=None, description="of the shaft, instead of a place")
-    part: Literal["shaft", "housing"] = Field(default="shaft", description="that it pushes")
+    station: _Station | None = Field(
+        default=None, description="station on the shaft, instead of a place"
+    )
+    part: Literal["shaft", "housing"] = Field(default="shaft", description="part that it acts on")
     direction: Literal["up", "side"] = Field(default="up", description="up or side")
 
     @model_validator(mode="after")
@@ -464,7 +503,7 @@ class ShaftExciter(PlacedExciter):
         if self.part == "housing" and self.place_scatter:
             faults.append(
                 f"place_scatter = {self.place_scatter:g} m must be 0 on a housing, which does not "
-                "tilt here; set part = 'shaft' or remove it"
+                "tilt in this model; set part = 'shaft' or remove it"
             )
         if self.part == "housing" and self.station is not None:
             faults.append(
@@ -476,39 +515,41 @@ class ShaftExciter(PlacedExciter):
 
     @property
     def where(self) -> str:
-        """For people: ``shaft at forward``, ``housing of forward``."""
+        """Description for people: ``shaft at forward``, ``housing of forward``."""
         if self.part == "housing":
             return f"housing of {self.place}"
         return f"shaft at {self.place or f'{self.station:g} m'}"
 
 
-# --- what is seen of it
+# --- sensors
 
 
 DIRECTIONS = {"up": "vertical, up", "side": "horizontal, to starboard"}
-"""Of sensors and forces, as a report tells them."""
+"""Directions of sensors and forces, in words for a report."""
 
 
 class LocalMode(Part):
-    """A part of a housing that swings in it, and that an accelerometer sits on.
+    """A resonant part of a housing on which an accelerometer is mounted.
 
-    Too light to push back: no other sensor hears of it.
+    It is too light to act back: no other sensor measures it.
     """
 
-    frequency: Frequency = Field(gt=0, le=1e6, description="of the part on its housing")
-    damping_ratio: Ratio = Field(gt=0, lt=1, description="of this mode")
+    frequency: Frequency = Field(
+        gt=0, le=1e6, description="natural frequency of the part on its housing"
+    )
+    damping_ratio: Ratio = Field(gt=0, lt=1, description="damping of this mode")
     share: Ratio = Field(
         default=0.0,
         ge=-1,
         le=1,
-        description="of its motion within the housing that the sensor hears; 0: none",
+        description="measured share of its motion relative to the housing; 0: none",
     )
 
 
 class ShaftAccelerometer(Part):
     """An accelerometer on a bearing's housing, with its converter."""
 
-    name: _Name = Field(description="of its channel")
+    name: _Name = Field(description="channel name")
     bearing: _Name = Field(description="name of the bearing whose housing it sits on")
     direction: Literal["up", "side"] = Field(default="up", description="up or side")
     gain: Ratio = Field(
@@ -516,23 +557,23 @@ class ShaftAccelerometer(Part):
     )
     noise: Acceleration = Field(default=0.0, ge=0, le=_NOISIEST, description="rms of white noise")
     mains: Acceleration = Field(
-        default=0.0, ge=0, le=_NOISIEST, description="rms of hum, harmonics and all"
+        default=0.0, ge=0, le=_NOISIEST, description="rms of mains hum with harmonics"
     )
-    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="mains frequency")
     range: Acceleration = Field(
         ge=_LEAST_RANGE, le=_MOST_RANGE, description="full scale, plus and minus"
     )
-    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
     modes: tuple[LocalMode, ...] = Field(
-        default=(), max_length=MOST_PARTS, description="of the part of the housing it sits on"
+        default=(), max_length=MOST_PARTS, description="modes of the part of the housing it sits on"
     )
 
 
 class ShaftProbe(ProximityProbe):
-    """A proximity probe in a bearing's housing: it reads the journal's motion towards itself.
+    """A proximity probe in a bearing's housing; it reads the journal's motion towards it.
 
-    Zero where the journal is in the middle of the bore as new. Its angle is from straight down in
-    the direction of rotation, as that of a journal bearing's probe.
+    It reads zero with the journal in the middle of the new bore. Its angle counts from straight
+    down in the direction of rotation, like that of a journal bearing's probe.
     """
 
     bearing: _Name = Field(description="name of the bearing whose housing it sits in")
@@ -542,4 +583,4 @@ class ShaftProbe(ProximityProbe):
 
 
 class StateLimits(ScarLimits):
-    """Limits of a fault of the line, with their source."""
+    """Limits of a fault of the line, and their source."""
