@@ -28,7 +28,7 @@ from wearstate.diagnose.charts.figure import (
     REFERENCE,
     SO_FAR,
     _legend_below,
-    apart,
+    distance_to_box,
     kind_of,
     question_figure,
     shaded_rows,
@@ -40,7 +40,7 @@ from wearstate.diagnose.charts.of_scene import (
 )
 from wearstate.diagnose.charts.page import chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.scene_edit import block_of
-from wearstate.diagnose.charts.words import HERE, effect_words
+from wearstate.diagnose.charts.words import AS_WRITTEN, effect_words
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.options.outputs import CHART_SUFFIXES
 from wearstate.sim.fidelity.differences import Candidate, Difference, differences
@@ -163,7 +163,7 @@ def test_nothing_beats_the_front_and_the_front_beats_the_rest(found):
 def test_points_are_rates_with_their_worst_quantity(chart):
     # half a second of recording: rates are twice the seconds
     assert {p.name: p.seconds for p in chart.of(RAISED) if p.errors} == {
-        HERE: 0.04,
+        AS_WRITTEN: 0.04,
         "film: short": 0.02,
         "film: direct": 4.0,
         "film: direct, mesh 144 around and 33 along": 8.0,
@@ -178,8 +178,8 @@ def test_the_scene_as_written_is_first_in_every_question(chart):
     assert chart.questions == (KEPT, RAISED)
     for question in chart.questions:
         first, *others = chart.of(question)
-        assert (first.name, first.here) == (HERE, True)
-        assert not any(point.here for point in others)
+        assert (first.name, first.written) == (AS_WRITTEN, True)
+        assert not any(point.written for point in others)
         seconds = [point.seconds for point in others]
         assert seconds == sorted(seconds)
 
@@ -364,7 +364,7 @@ def test_where_the_rungs_are_the_best_one_answer_is_told_once():
     two = chart_of(scene, other)
     assert len(two.conclusion) == 3
     _, rows = shaded_rows(two)  # the scene as written is the same in both
-    assert [label for label, _ in rows].count(HERE) == 1
+    assert [label for label, _ in rows].count(AS_WRITTEN) == 1
 
 
 def test_an_error_of_the_reference_that_matters_is_told_beside_that_of_the_scene():
@@ -477,9 +477,9 @@ def test_a_number_in_a_crowd_is_nearest_to_its_own_point_or_has_a_line_to_it():
     assert len(numbered) >= 6
     for number, point in enumerate(numbered, start=1):
         box, own = texts[str(number)], pixels[point.name]
-        led = any(len(line) == 2 and math.dist(line[0], own) < 1 and apart(box, line[1]) < 1
-                  for line in lines)  # fmt: skip
-        nearest = min(pixels, key=lambda name: apart(box, pixels[name]))
+        ends = [line for line in lines if len(line) == 2 and math.dist(line[0], own) < 1]
+        led = any(distance_to_box(box, end) < 1 for _, end in ends)
+        nearest = min(pixels, key=lambda name: distance_to_box(box, pixels[name]))
         assert led or nearest == point.name
     # the choice is named by its number, beside what is said of it
     [choice] = chart.shown_choices
@@ -552,7 +552,7 @@ def test_an_error_nearer_to_the_accuracy_than_the_reference_is_known_is_not_call
     assert ("too close to call" in where) == close
     assert ("is not within" in where) != close
     page = chart_html(chart)
-    [row] = re.findall(rf"<tr[^>]*><td>{HERE}</td>(?:(?!</tr>).)*verdict.*?</tr>", page)
+    [row] = re.findall(rf"<tr[^>]*><td>{AS_WRITTEN}</td>(?:(?!</tr>).)*verdict.*?</tr>", page)
     assert (">at the limit</td>" in row) == close
     assert ("to be on the safe side" in take) == close
     assert "mesh 72 around (was 36) and 17 along (was 9)" in take
@@ -581,7 +581,7 @@ def test_points_stand_where_they_are_chosen_by_and_measured_times_are_kept():
     )
     chart = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found)
     points = {p.name: p for p in chart.of(RAISED)}
-    here, other = points[HERE], points["film: direct"]
+    here, other = points[AS_WRITTEN], points["film: direct"]
     assert (here.seconds, here.measured_seconds) == (0.12, 0.12)
     assert other.seconds == pytest.approx(0.12 * 2.0 / 0.02)  # by the tables
     assert other.measured_seconds == 0.02
@@ -686,7 +686,7 @@ def test_numerics_that_are_within_on_coarse_rungs_are_called_so_and_are_not_gree
     tables = page.split("All that was computed, ")[1:]
     assert "numerics only, against the same rungs" in tables[0].split("</h2>")[0]
     assert "numerics only" not in tables[1]
-    row = re.search(rf"<tr class=\"([^\"]*)\"><td>{HERE}</td>.*?</tr>", tables[0])
+    row = re.search(rf"<tr class=\"([^\"]*)\"><td>{AS_WRITTEN}</td>.*?</tr>", tables[0])
     assert "taken coarse" in row[1]  # not the green of what is enough
     assert 'data-label="verdict">numerics within</td>' in row[0]
     assert "numerics within" not in tables[1]
@@ -749,7 +749,7 @@ def test_the_table_of_quantities_shows_each_column_once_and_red_above_the_accura
     chart = coarse_mesh(0.03, candidate(1.0, 0.005, mesh="x1"))
     heads, rows = shaded_rows(chart)
     assert heads == ["peak film force", "rms film force"]  # the worst first, no unit
-    assert [label for label, _ in rows] == [HERE, "mesh 72 around and 17 along"]
+    assert [label for label, _ in rows] == [AS_WRITTEN, "mesh 72 around and 17 along"]
     colours = [[cell.ground for cell in cells] for _, cells in rows]
     assert colours[0][1] == colours[1][0] == colours[1][1] == "#ffffff"  # 0.8, 0.5 and 0.1 %
     assert colours[0][0] not in ("#ffffff", PALE)
@@ -790,7 +790,7 @@ def test_points_of_the_picture_have_names(chart, tmp_path):
     svg = (tmp_path / "chart.svg").read_text()
     page = (tmp_path / "chart.html").read_text()
     assert svg.count("<title>") == len(chart.points) - 1  # the invalid one has no place
-    title = f"<title>{HERE}: 0.04 s, error 0.10% (peak film force)</title>"
+    title = f"<title>{AS_WRITTEN}: 0.04 s, error 0.10% (peak film force)</title>"
     assert title in svg
     assert title in page
     assert "a link is in tension" in page
@@ -900,7 +900,8 @@ def test_a_journal_needs_its_map_only(journal):
     assert by_name["mesh 48 around and 9 along"].error < 1e-3
     assert chart.status == "resolved"
     # a map is interpolated, a direct film solved at every step
-    assert by_name[HERE].seconds < by_name["film: direct, mesh 48 around and 9 along"].seconds / 3
+    direct = by_name["film: direct, mesh 48 around and 9 along"]
+    assert by_name[AS_WRITTEN].seconds < direct.seconds / 3
     assert [choice.keeps for choice in chart.choices] == [True, True]
 
 
@@ -1110,7 +1111,7 @@ def test_a_cut_run_is_timed_as_a_whole_one_and_said_to_be_cut():
     for one, other in zip(whole.points, cut.points, strict=True):
         assert other.seconds == pytest.approx(4 * one.seconds)
     assert cut.choices[0].own_seconds == pytest.approx(4 * whole.choices[0].own_seconds)
-    assert "0.5 s a run, cut from 3.2 s" in cut.note
+    assert "0.5 s per run, cut from 3.2 s" in cut.note
     assert "confirmed on whole ones" in cut.note
     assert "cut" not in whole.note
     assert "confirmed" not in whole.note

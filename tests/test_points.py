@@ -44,7 +44,7 @@ def chart():
         accuracy=0.02,
         points=(
             point("coarse", 0.01, 0.015, on_front=True, block=BLOCK),
-            point("written", 0.1, 0.004, here=True, on_front=True, block="# scene: written"),
+            point("written", 0.1, 0.004, written=True, on_front=True, block="# scene: written"),
             point(HOSTILE, 1.0, 0.03, verdict="doubtful"),
             Point(name="fails", rungs={}, seconds=math.nan, verdict="invalid"),
         ),

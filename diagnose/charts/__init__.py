@@ -1,4 +1,4 @@
-"""Speed against accuracy: of a scene's rungs, and of features and models.
+"""Speed against accuracy, for the rungs of a scene and for features and models.
 
 It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
 ``sim.fidelity``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,

@@ -1,7 +1,7 @@
-"""Does fidelity matter for the verdict? Trained on a cheap rung, judged on the best.
+"""Effect of fidelity on the verdict: trained on a cheap rung, judged on the best.
 
-The same machines are drawn for every rung: records of one number differ in the model alone, so
-that the loss is a paired difference over held-out machine draws.
+The same machines are drawn for every rung, so that records with the same number differ in the model
+alone and the loss is a paired difference over held-out machine draws.
 """
 
 import math
@@ -29,31 +29,31 @@ from ..learning.regressions import CANDIDATES, fit_blend
 Float = NDArray[np.float64]
 
 _FOLDS = 5
-_FEWEST_DRAWS = 10  # two a fold
+_FEWEST_DRAWS = 10  # two per fold
 _CANDIDATES = [each for each in CANDIDATES if each.name.startswith("ridge")]  # the fast ones
-_FLIPS = 4_999  # random signs of the paired test: its least p-value is 1 in 5,000
+_FLIPS = 4_999  # random signs of the paired test: its smallest p-value is 1 in 5,000
 
 
 @dataclass(frozen=True, kw_only=True)
 class Loss:
-    """What training on one rung costs.
+    """Loss of accuracy by training on one rung.
 
     Attributes
     ----------
     effect, rung : str
-        The one effect that is lowered, and to what.
+        The one effect that is lowered, and its rung.
     cost : float
-        Tabulated, over that of the best rungs.
+        Tabulated cost relative to that of the best rungs.
     error : Difference
-        Mean absolute error on the best rungs over the condemning limit, trained on this one.
+        Mean absolute error on the best rungs over the condemning limit, trained on this rung.
     loss : Difference
-        Of that error against training on the best rungs, paired by machine draw.
+        Increase of that error over training on the best rungs, paired by machine draw.
     p_value : float
-        Of no loss or gain, by random signs of the draws' differences; two-sided.
+        Two-sided p-value of no loss or gain, by random signs of the draws' differences.
     records : int
-        That both could simulate.
+        Records that could be simulated with both.
     reason : str
-        Why there is no figure; empty where there is one.
+        Why there is no figure; empty if there is one.
     """
 
     effect: str
@@ -74,9 +74,9 @@ class Across:
     ----------
     recipe : str
     best : mapping of str to str
-        Effect -> rung that all are judged on.
+        Effect -> rung used for judging.
     error : Difference
-        Trained and judged on the best rungs.
+        Error when trained and judged on the best rungs.
     losses : tuple of Loss
     records, draws : int
     """
@@ -100,27 +100,27 @@ def across_fidelity(
     jobs: int = 1,
     say: Callable[[str], None] | None = None,
 ) -> Across:
-    """Generate a recipe on every rung of its effects, train on each, judge on the best.
+    """Generate a recipe on every rung of its effects, train on each and judge on the best.
 
     Parameters
     ----------
     name : str or Path
         Recipe.
     n : int
-        Records of every rung.
+        Records per rung.
     folder : Path
-        For the data sets, one a rung; those that are there are used again.
+        Folder of the data sets, one per rung; existing ones are reused.
     effects : sequence of str
-        Only these are raised and lowered, others stay as written; all but steps and meshes by
-        default.
+        Effects to be raised and lowered, while others stay as written; by default all but steps
+        and meshes.
     overrides : mapping, optional
         Dotted path of the scene -> value.
     seed : int
-        Of the data sets and the folds.
+        Seed of the data sets and the folds.
     jobs : int
         Worker processes.
     say : callable, optional
-        Called with a line about every rung.
+        Called with a line for every rung.
 
     Returns
     -------
@@ -129,9 +129,9 @@ def across_fidelity(
     Raises
     ------
     DataError
-        An effect is unknown or has one rung only, or there are too few machine draws.
+        An effect is unknown or has only one rung, or there are too few machine draws.
     RecipeError
-        The recipe is at fault.
+        The recipe is invalid.
     """
     sets = RungSets(
         name, n, folder, effects=effects, overrides=overrides, seed=seed, jobs=jobs, say=say
@@ -153,21 +153,21 @@ def across_fidelity(
 
 
 class RungSets:
-    """Data sets of one recipe on other rungs, the same machines in each, and their features.
+    """Data sets of one recipe on several rungs, with the same machines in each, and their features.
 
     Parameters
     ----------
     name, n, folder, effects, overrides, seed, jobs, say
-        As of :func:`across_fidelity`.
+        As in :func:`across_fidelity`.
 
     Attributes
     ----------
     plain : Recipe
-        As it is written.
+        The recipe as written.
     effects : list of Effect
-        Those whose rungs are compared.
+        Effects whose rungs are compared.
     best, written : dict of str to str
-        Effect -> its best rung, and the one of the recipe's scene.
+        Effect -> its best rung, and the rung in the recipe's scene.
     """
 
     def __init__(
@@ -192,7 +192,7 @@ class RungSets:
         self.written = {each.name: each.current(scene) for each in self.effects}
 
     def values(self, rungs: Mapping[str, str]) -> dict[str, Any]:
-        """Dotted path of the scene -> value of these rungs."""
+        """Scene values of these rungs, by dotted path."""
         return {
             path: value
             for effect in self.effects
@@ -200,11 +200,11 @@ class RungSets:
         }
 
     def cost(self, rungs: Mapping[str, str]) -> float:
-        """Tabulated, of one record [s]."""
+        """Tabulated cost of one record [s]."""
         return cost_of(with_values(self.plain.scene, self.values(rungs)))
 
     def table(self, rungs: Mapping[str, str]) -> FeatureTable:
-        """Features of the data set on these rungs, which is made where it is not there."""
+        """Features of the data set on these rungs, which is generated if missing."""
         key = tuple(rungs[effect.name] for effect in self.effects)
         if key not in self._tables:
             self._tables[key] = self._made(rungs)
@@ -222,7 +222,7 @@ class RungSets:
         return feature_table(path, jobs=self.jobs)
 
     def judge(self) -> "PairedJudge":
-        """Of what is trained on other rungs: the best ones."""
+        """Judge on the best rungs of what is trained on others."""
         column = self.plain.severity_columns[0]
         limits = wear_limits(self.plain.scene, column)
         if limits is None:
@@ -233,15 +233,15 @@ class RungSets:
 def loss_of(
     sets: RungSets, judge: "PairedJudge", effect: str, rung: str, rungs: Mapping[str, str]
 ) -> Loss:
-    """What training on these rungs costs; without a figure where they cannot be simulated.
+    """Loss by training on these rungs; without a figure if they cannot be simulated.
 
     Parameters
     ----------
     sets : RungSets
     judge : PairedJudge
-        Its own.
+        Judge of the same data sets.
     effect, rung : str
-        Names of the loss.
+        Names to be recorded in the result.
     rungs : mapping of str to str
         Effect -> rung.
     """
@@ -274,7 +274,7 @@ def _effects(scene: Scene, wanted: Sequence[str]) -> list[Effect]:
 
 
 class PairedJudge:
-    """Errors on the best rungs, by folds of whole machine draws."""
+    """Errors on the best rungs, in folds of whole machine draws."""
 
     def __init__(self, best: FeatureTable, limit: float, column: str, seed: int) -> None:
         self.best, self.limit, self.seed = best, limit, seed
@@ -290,9 +290,9 @@ class PairedJudge:
         self.own = self.errors(best, np.ones(len(self.ids), dtype=bool))
 
     def errors(self, table: FeatureTable, usable: NDArray[np.bool_]) -> Float:
-        """Absolute errors over the limit of every best record, trained on another table's.
+        """Absolute errors over the limit for every best record, trained on another table.
 
-        `usable` says which best records the table has, too; only those are trained on.
+        Only `usable` best records, which the other table has too, are used for training.
         """
         rows = {record: i for i, record in enumerate(table.manifest["record_id"])}
         found = np.empty_like(self.truth)
@@ -312,14 +312,14 @@ class PairedJudge:
         left = len(np.unique(self.draws[usable]))
         if left < _FEWEST_DRAWS or other.names != self.best.names:
             return _no_loss(effect, rung, cost, f"{left} machine draws could be simulated")
-        there = self.errors(other, usable)
-        here = self.own if usable.all() else self.errors(self.best, usable)
-        means = _draw_means(there - here, self.draws)
+        errors = self.errors(other, usable)
+        best = self.own if usable.all() else self.errors(self.best, usable)
+        means = _draw_means(errors - best, self.draws)
         return Loss(
             effect=effect,
             rung=rung,
             cost=cost,
-            error=self.mean(there),
+            error=self.mean(errors),
             loss=_difference(means),
             p_value=sign_flip_test(means, seed=self.seed),
             records=int(usable.sum()),
@@ -354,20 +354,20 @@ def _difference(means: Float) -> Difference:
 
 
 def sign_flip_test(differences: Float, *, seed: int = 0) -> float:
-    """Two-sided p-value of paired differences whose sign would be chance without an effect.
+    """Two-sided p-value of paired differences, whose signs are random if there is no effect.
 
     Parameters
     ----------
     differences : numpy.ndarray [shape=(n,)]
-        One a pair.
+        One difference per pair.
     seed : int
-        Of the random signs.
+        Seed of the random signs.
 
     Returns
     -------
     float
-        Share of :data:`_FLIPS` sign patterns whose mean is as far from zero, the one observed
-        among them; of 12 pairs and fewer all patterns.
+        Share of :data:`_FLIPS` sign patterns, including the observed one, whose mean is as far
+        from zero; up to 12 pairs all patterns are used.
 
     References
     ----------
@@ -394,7 +394,7 @@ _ROUNDING = 1e-12
 
 
 def across_table(found: Across) -> dict[str, Any]:
-    """As plain values."""
+    """Result as plain values."""
     return {
         "recipe": found.recipe,
         "judged_on": dict(found.best),
@@ -406,7 +406,7 @@ def across_table(found: Across) -> dict[str, Any]:
 
 
 def across_text(found: Across) -> str:
-    """As lines for a terminal."""
+    """Result as lines for a terminal."""
     best = ", ".join(f"{effect} {rung}" for effect, rung in found.best.items())
     return "\n".join(
         [

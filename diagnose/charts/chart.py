@@ -1,4 +1,4 @@
-"""Speed against accuracy: what every choice costs, and how wrong it is.
+"""Speed against accuracy: cost and error of every choice.
 
 One chart serves the rungs and steps of a scene (:mod:`.charts.of_scene`: wall time of a simulated
 second against the error of its quantities of interest) and the diagnosis of a data set
@@ -19,9 +19,9 @@ from ...sim.fidelity.findings import Convergence
 Clock = Callable[[], float]
 
 RECOMMENDED = ("resolved", "so far", "unresolvable")
-"""Statuses of a choice that may be taken; others recommend nothing."""
+"""Statuses with which a choice is recommended."""
 
-_GAIN = 0.95  # of an error: the most of it that a slower point on the front may have
+_GAIN = 0.95  # largest error of a slower point on the front, relative to the faster one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,36 +31,36 @@ class Point:
     Attributes
     ----------
     name : str
-        What it has other than the scene as written.
+        Differences from the scene as written, in words.
     rungs : mapping of str to str
-        All of the choice, effect by effect.
+        Effect -> rung of the choice.
     seconds : float
-        Cost that points are drawn and chosen by, of one simulated second or one recording [s]: of
-        a scene by the cost tables, scaled so that the scene as written takes its measured time.
+        Cost used for drawing and choosing, per simulated second or recording [s]: for a scene from
+        the cost tables, scaled so that the scene as written takes its measured time.
     errors : mapping of str to Difference
-        Of every quantity [-]; empty where it is not valid.
+        Errors of every quantity [-]; empty if the choice is not valid.
     verdict : str
         ``within``, ``beyond``, ``doubtful`` or ``invalid``; ``reference``.
     reason : str
         Why it is not within.
     starts : int
-        That the errors are means of.
+        Number of starts over which the errors are averaged.
     on_front : bool
         No other point is both faster and more accurate.
     counts : str
-        Quantity by which it is judged; the one with the largest error where none is named.
+        Quantity by which it is judged; empty for the one with the largest error.
     question : str
-        That it belongs to, where a chart answers several; errors are against the reference of that
-        question.
-    here : bool
-        The scene as it is written.
+        Question to which it belongs if a chart answers several; errors are against the reference
+        of that question.
+    written : bool
+        The scene as written.
     block : str
-        TOML to paste into the scene or recipe; comment only where nothing is to be changed, empty
-        where the choice is none of a scene.
+        TOML to paste into the scene or recipe; only a comment if nothing is to be changed, empty
+        if the choice does not belong to a scene.
     close : bool
         Its error is nearer to the accuracy than the reference is known.
     measured_seconds : float
-        Least of the measured times of what `seconds` is of; NaN where none was taken.
+        Shortest measured time for what `seconds` refers to; NaN if not measured.
     """
 
     name: str
@@ -73,68 +73,69 @@ class Point:
     on_front: bool = False
     counts: str = ""
     question: str = ""
-    here: bool = False
+    written: bool = False
     block: str = ""
     close: bool = False
     measured_seconds: float = math.nan
 
     @property
     def worst(self) -> str:
-        """Quantity by which the point is judged; empty where there is none."""
+        """Quantity by which the point is judged; empty if there is none."""
         if self.counts:
             return self.counts
         return max(self.errors, key=lambda name: self.errors[name].error, default="")
 
     @property
     def error(self) -> float:
-        """Of that quantity [-]; infinite where it is not valid."""
+        """Error of that quantity [-]; infinite if the point is not valid."""
         return self.errors[self.worst].error if self.errors else math.inf
 
     @property
     def standard_error(self) -> float:
-        """Of that error [-]; NaN where it cannot be told."""
+        """Standard error of that error [-]; NaN if unknown."""
         found = self.errors[self.worst].standard_error if self.errors else math.nan
         return found if math.isfinite(found) else math.nan
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """What to take, for one question.
+    """Recommendation for one question.
 
     Attributes
     ----------
     question : str
-        As of :class:`Point`.
+        As in :class:`Point`.
     name : str
-        Of the point.
+        Name of the point.
     status : str
         ``resolved``, ``so far``, ``unresolvable``, ``not converged`` or ``no answer yet``.
     error, standard_error, promised : float
-        Of the worst quantity, and the sum of both of the worst quantity by it [-].
+        Error and standard error of the worst quantity, and the largest sum of both over all
+        quantities [-].
     starts : int
-        That the error is the mean of.
+        Number of starts over which the error is averaged.
     seconds : float
-        Of a simulated second [s].
+        Cost of a simulated second [s].
     changes : mapping of str to object
-        Dotted path -> value, of what the scene as written must change.
+        Changes to the scene as written: dotted path -> value.
     block, options : str
-        The same as TOML to paste, and as options of a command.
+        The changes as TOML to paste, and as options of a command.
     reference : str
-        What the error is taken against, in words.
+        Reference of the error, in words.
     sentence : str
         The conclusion.
     keeps : bool
         Nothing is to be changed.
     words : str
-        The name, with what the scene as written has instead.
+        The name, with the values of the scene as written.
     own_seconds : float
-        Of a simulated second of the scene as written [s]; NaN where it was not timed.
+        Cost of a simulated second of the scene as written [s]; NaN if it was not timed.
     clear : bool
-        It is within the accuracy by more than its reference may be off.
+        It is within the accuracy by more than the error of its reference.
     optional : bool
         The scene as written is surely within the accuracy too.
     enough : bool
-        False where the scene stays outside the accuracy even so, for its rungs.
+        False if the rungs of the scene keep it outside the accuracy even so.
     """
 
     question: str
@@ -160,20 +161,20 @@ class Choice:
 
 @dataclass(frozen=True, kw_only=True)
 class RungCost:
-    """What one rung of the scene as written costs: its error against the best of its effect.
+    """Error of one rung of the scene as written against the best rung of its effect.
 
     Attributes
     ----------
     effect, written, best : str
         Effect in words, names of the rungs.
     error, standard_error : float
-        Of the worst quantity [-].
+        Error of the worst quantity, and its standard error [-].
     worst : str
         That quantity in words.
     starts : int
-        That the error is the mean of.
+        Number of starts over which the error is averaged.
     text : str
-        All of it in one line.
+        Summary in one line.
     """
 
     effect: str
@@ -188,55 +189,55 @@ class RungCost:
 
 @dataclass(frozen=True, kw_only=True)
 class Chart:
-    """Every choice that ran, with the front.
+    """All choices that ran, with the front.
 
     Attributes
     ----------
     name, title : str
     cost_label, error_label : str
-        Of the axes, with units.
+        Labels of the axes, with units.
     accuracy : float or None
-        Asked; None where only the front counts.
+        Requested accuracy; None if only the front matters.
     points : tuple of Point
         Fastest first.
     reference : str
-        Name of the point that errors are taken against; empty where truth is known.
+        Name of the reference point of the errors; empty if the truth is known.
     status : str
         ``resolved``, ``unresolvable``, ``not converged`` or ``out of budget``.
     winner : str
-        Name of the fastest point within the accuracy; empty where none may be named.
+        Name of the fastest point within the accuracy; empty if there is none.
     verdict : str
         The finding in one sentence.
     convergence : tuple of Convergence
-        Of the reference.
+        Convergence of the reference.
     refused, pruned : tuple of str
-        What did not run, and why.
+        Choices that did not run, and why.
     note : str
-        How it was measured.
+        How the chart was measured.
     conclusion : tuple of str
-        The finding in a few sentences, of a scene.
+        For a scene: the finding in a few sentences.
     choices : tuple of Choice
-        What to take, question by question, of a scene.
+        For a scene: recommendation for each question.
     raises : tuple of RungCost
-        What each rung of the scene as written costs.
+        Error of each rung of the scene as written.
     labels : mapping of str to str
-        Quantity -> words and unit; a quantity that has none stands for itself.
+        Quantity -> words and unit; a quantity without a label is shown by its name.
     measured, planned : int
-        Points measured, of those of interest; 0 of 0 where nothing was left out.
+        Points measured, and points of interest; both 0 if nothing was left out.
     left : str
-        What an unfinished search still takes, in words; empty where that is not known.
+        Remaining time of an unfinished search, in words; empty if unknown.
     alike : str
-        Why all questions have one answer, of which the last is shown; empty where they have not.
+        Why all questions have the same answer, of which the last is shown; empty if they differ.
     varied : mapping of str to str
         Question -> what may vary, in words.
     error_labels : mapping of str to str
-        Question -> name of its error axis, where it is not `error_label`.
+        Question -> name of its error axis, if not `error_label`.
     at_best : tuple of (str, str)
-        Effects and their rungs of the scene as written that are the best already.
+        Effects of the scene as written that already have their best rung, and that rung.
     own : str
-        Numerics of the scene as written, in words; empty where they were not run.
+        Numerics of the scene as written, in words; empty if they were not run.
     subject : str
-        ``scene``, or ``recipe`` where the errors are those of the verdict.
+        ``scene``, or ``recipe`` if the errors are those of the verdict.
     """
 
     name: str
@@ -269,27 +270,27 @@ class Chart:
 
     @property
     def questions(self) -> tuple[str, ...]:
-        """Of its points, in their order."""
+        """Questions of its points, in their order."""
         return tuple(dict.fromkeys(point.question for point in self.points))
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Questions that are shown: of those with one answer the last, whose points are most."""
+        """Questions that are shown: only the last, with most points, if all have one answer."""
         return self.questions[-1:] if self.alike else self.questions
 
     def heading(self, question: str) -> str:
-        """Of what is shown of a question, with what may vary."""
+        """Heading of a question, with what may vary."""
         what = "all choices" if self.alike else question
         if question in self.varied:
             what = f"{what}: {self.varied[question]} may vary"
         return f"{what} (numerics only, against the same rungs)" if self.partial(question) else what
 
     def partial(self, question: str) -> bool:
-        """Whether errors of a question are those of the numerics, not of the rungs as well."""
+        """Whether errors of a question include only those of the numerics, not of the rungs."""
         return question in self.error_labels
 
     def verdict_words(self, point: Point) -> str:
-        """Verdict on a point, and whether it is one on its numerics only."""
+        """Verdict on a point, marked if it only concerns its numerics."""
         words = "at the limit" if point.close else point.verdict
         judged = self.partial(point.question) and point.verdict not in ("reference", "invalid")
         return f"numerics {words}" if judged else words
@@ -305,7 +306,7 @@ class Chart:
 
     @property
     def unfinished(self) -> bool:
-        """Something was left out for want of time."""
+        """Whether something was left out for lack of time."""
         return self.status == "out of budget"
 
     def of(self, question: str) -> tuple[Point, ...]:
@@ -313,13 +314,13 @@ class Chart:
         return tuple(point for point in self.points if point.question == question)
 
     def numbered(self, question: str) -> tuple[Point, ...]:
-        """Points of its front, fastest first, without those that a picture gives a name."""
-        front = [p for p in self.of(question) if p.on_front and not p.here]
+        """Points of its front, fastest first, without those that a picture names."""
+        front = [p for p in self.of(question) if p.on_front and not p.written]
         front = [p for p in front if p.verdict != "reference"]
         return tuple(sorted(front, key=lambda p: p.seconds))
 
     def number(self, choice: Choice) -> int | None:
-        """Number of a choice in the picture of its question; None where it has none."""
+        """Number of a choice in the picture of its question; None if it has none."""
         names = [point.name for point in self.numbered(choice.question)]
         return names.index(choice.name) + 1 if choice.name in names else None
 
@@ -329,17 +330,17 @@ class Chart:
 
     @property
     def front(self) -> tuple[Point, ...]:
-        """Points that no other is both faster and more accurate than, fastest first."""
+        """Points for which no other is both faster and more accurate, fastest first."""
         return tuple(point for point in self.points if point.on_front)
 
     @property
     def remaining(self) -> float:
-        """Error that the reference itself is left with [-]: below it no error is known."""
+        """Remaining error of the reference itself [-]; smaller errors are unknown."""
         return max(map(remaining_error, self.convergence), default=0.0)
 
 
 def remaining_error(each: Convergence) -> float:
-    """Error that Richardson leaves in the reference [-], an order below a half not believed.
+    """Error left in the reference [-], by Richardson extrapolation with an order >= 1/2.
 
     Parameters
     ----------
@@ -348,7 +349,7 @@ def remaining_error(each: Convergence) -> float:
     Returns
     -------
     float
-        The last change where no order can be told.
+        The last change if no order can be estimated.
 
     References
     ----------
@@ -372,18 +373,18 @@ _LEAST_ORDER = 0.5
 
 
 def front_of(places: Sequence[tuple[float, float]]) -> list[bool]:
-    """Which of some (cost, error) pairs no other beats in one without losing in the other.
+    """Find the (cost, error) pairs that no other pair improves in one without loss in the other.
 
     Parameters
     ----------
     places : sequence of (float, float)
-        A pair that is not finite is on no front.
+        A pair that is not finite is never on the front.
 
     Returns
     -------
     list of bool
-        In the order given; of equal pairs the first. Slower for less than a twentieth of the error
-        is no gain: times scatter more.
+        In the order given; of equal pairs only the first. A slower point must reduce the error by
+        at least a twentieth, because times scatter more.
 
     Examples
     --------
@@ -465,7 +466,7 @@ def _point_table(point: Point) -> dict[str, Any]:
         "starts": point.starts,
         "on_front": point.on_front,
         "question": point.question,
-        "here": point.here,
+        "here": point.written,
         "block": point.block,
         "errors": {
             name: {"mean": each.mean, "standard_error": each.standard_error}
@@ -497,14 +498,14 @@ def chart_rows(chart: Chart) -> list[tuple[Any, ...]]:
     Returns
     -------
     list of tuple
-        Of a point that is not valid one row without quantity.
+        One row without quantity for a point that is not valid.
     """
     rows: list[tuple[Any, ...]] = []
     for point in chart.points:
         head = (
             point.question,
             point.name,
-            int(point.here),
+            int(point.written),
             int(point.on_front),
             point.verdict,
             point.seconds,
@@ -554,9 +555,9 @@ def chart_text(chart: Chart) -> str:
 
 
 def _question_lines(chart: Chart, question: str) -> list[str]:
-    """Points that a person chooses among: where one stands, what to take, the front."""
+    """Points to choose among: the scene as written, the recommendation, the front."""
     wanted = {choice.name for choice in chart.choices if choice.question == question}
-    shown = [p for p in chart.of(question) if p.here or p.on_front or p.name in wanted]
+    shown = [p for p in chart.of(question) if p.written or p.on_front or p.name in wanted]
     head = [
         f"{chart.heading(question) or chart.cost_label}",
         f"{'seconds':>10}  {'error':>8}  choice",
@@ -573,7 +574,7 @@ def _share(value: float) -> str:
 
 
 def convergence_text(each: Convergence, labels: Mapping[str, str] | None = None) -> str:
-    """How the reference converges with one effect, in one line.
+    """Convergence of the reference with one effect, in one line.
 
     Parameters
     ----------

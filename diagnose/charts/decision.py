@@ -1,4 +1,4 @@
-"""What a chart of a scene recommends: the choices of a study, and how sure they are."""
+"""Recommendations of a scene's chart: the choices of a study, and their certainty."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ KEPT, RAISED = "your rungs kept", "rungs may change"
 
 
 def best_already(found: Study) -> bool:
-    """Whether the scene's rungs are the best that it can have: only numerics can be better."""
+    """Whether the scene has its best possible rungs, so that only numerics can be better."""
     return found.raised is not None and _rungs_of(found.raised) == _rungs_of(found.kept)
 
 
@@ -27,9 +27,9 @@ def _rungs_of(answer: Answer) -> dict[str, str]:
 
 
 def decided(scene: Scene, found: Study) -> Study:
-    """A study whose choices stay within the accuracy whatever its references are off by.
+    """Study whose choices stay within the accuracy despite the error of its references.
 
-    Other rungs that gain next to nothing are not chosen.
+    Other rungs that save next to nothing are not chosen.
     """
     kept = _sure(scene, found, found.kept)
     if found.raised is None:
@@ -43,11 +43,11 @@ def decided(scene: Scene, found: Study) -> Study:
     return replace(found, kept=kept, raised=raised)
 
 
-_NO_GAIN = 0.9  # of the cost: other rungs must save more
+_NO_GAIN = 0.9  # of the cost: other rungs must cost less than that
 
 
 def _sure(scene: Scene, found: Study, answer: Answer) -> Answer:
-    """The cheapest choice that is clear of the limit instead of one that is not."""
+    """Replace a choice that is not clear of the limit by the cheapest one that is."""
     if answer.status != "resolved" or by_default(answer):
         return answer
     clear = (c for c in answer.candidates if _fits(found, answer, c) == _CLEAR)
@@ -62,34 +62,34 @@ _CLEAR = 2
 
 
 def _fits(found: Study, answer: Answer, each: Candidate) -> int:
-    """2 where a candidate is within the accuracy by more than its reference is off; 1 if within."""
+    """2 if a candidate is within the accuracy by more than the reference error, 1 if within."""
     room = found.accuracy - reference_error(answer)
     return 0 if each.verdict != "within" else _CLEAR if estimated_error(each) <= room else 1
 
 
 def reference_error(answer: Answer) -> float:
-    """What a reference may itself be off by [-]."""
+    """Possible error of a reference itself [-]."""
     return max(map(remaining_error, answer.convergence), default=0.0)
 
 
 def at_limit(found: Study, own: Candidate) -> bool:
-    """Whether an error lies nearer to the accuracy than it is known, by two digits at the best."""
+    """Whether an error is nearer to the accuracy than its uncertainty, at least two digits."""
     scatter = scatter_of(own)
     if own.verdict == "doubtful" and scatter > _FAINT * found.accuracy:
         return False
-    apart = abs(own.error - found.accuracy)
+    distance = abs(own.error - found.accuracy)
     unknown = reference_error(found.whole) + (scatter if math.isfinite(scatter) else 0.0)
-    return apart <= max(unknown, _TWO_DIGITS * found.accuracy)
+    return distance <= max(unknown, _TWO_DIGITS * found.accuracy)
 
 
-_FAINT = 1 / 3  # of the accuracy: a standard error with which nothing is near anything
+_FAINT = 1 / 3  # of the accuracy: with a larger standard error nothing counts as near the limit
 
 
-_TWO_DIGITS = 0.01  # of the accuracy: what is seen of an error told with two digits
+_TWO_DIGITS = 0.01  # of the accuracy: resolution of an error given with two digits
 
 
 def why_alike(found: Study) -> str:
-    """Why both questions have one answer, the same settings; empty where they have two."""
+    """Why both questions have the same answer; empty if they differ."""
     raised = found.raised
     if (
         raised is None
@@ -104,18 +104,18 @@ def why_alike(found: Study) -> str:
 
 
 def physical_effects(scene: Scene) -> set[str]:
-    """Names of the effects that are no numerics."""
+    """Names of the effects that are physical, not numerical."""
     return {effect.name for effect in effects_of(scene) if not effect.numerical}
 
 
 def scatter_of(chosen: Candidate) -> float:
-    """Standard error of the worst quantity; infinite where nothing could be run."""
+    """Standard error of the worst quantity; infinite if nothing could be run."""
     worst = max(chosen.differences.values(), key=lambda each: each.error, default=None)
     return math.inf if worst is None else worst.standard_error
 
 
 def status_of(found: Study, answer: Answer) -> str:
-    """Of a choice, as of :class:`.chart.Choice`."""
+    """Status of a choice, as in :class:`.chart.Choice`."""
     if max(answer.left, reference_error(answer)) > found.accuracy:
         return "not converged"
     if answer.status == "so far" and by_default(answer) and answer.changes:
@@ -124,12 +124,12 @@ def status_of(found: Study, answer: Answer) -> str:
 
 
 def by_default(answer: Answer) -> bool:
-    """Whether the reference itself is taken, for want of anything cheaper."""
+    """Whether the reference itself is chosen because nothing cheaper is within the accuracy."""
     return dict(answer.chosen.rungs) == dict(answer.reference.rungs)
 
 
 def rungs_too_coarse(found: Study) -> bool:
-    """Whether the scene as written surely misses the accuracy for its rungs, not its numerics."""
+    """Whether the scene surely misses the accuracy because of its rungs, not its numerics."""
     own = found.raised.written if found.raised else None
     if own is None or own.verdict != "beyond" or not found.raises:
         return False
@@ -144,5 +144,5 @@ def surely_enough(found: Study, own: Candidate | None) -> bool:
 
 
 def values_before(scene: Scene, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """What stands at the paths that change."""
+    """Present values at the paths that change."""
     return {path: written_value(scene, path) for path in changes}

@@ -1,4 +1,4 @@
-"""Picture of a chart: where one stands, what to take, the front, every quantity."""
+"""Picture of a chart: scene as written, recommendation, front, every quantity."""
 
 import math
 import re
@@ -23,10 +23,10 @@ from .chart import RECOMMENDED, Chart, Choice, Point
 from .words import few_starts, percent, with_scatter
 
 FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
-WINNER, SO_FAR, HERE_COLOUR = "#3a923a", "#e07b39", "#111111"
-FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
+WINNER, SO_FAR, WRITTEN_COLOUR = "#3a923a", "#e07b39", "#111111"
+FLOOR = 1e-3  # %, smallest error that is drawn; the reference is drawn on it
 BEST, BEATEN = "nothing faster is as accurate", "beaten by another"
-UNTOLD, REFERENCE = "scatter too large to decide", "reference"
+UNDECIDED, REFERENCE = "scatter too large to decide", "reference"
 TOO_CLOSE = "too close to call"
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
@@ -39,7 +39,7 @@ def chart_figure(chart: Chart) -> Any:
     Parameters
     ----------
     chart : Chart
-        With one finite point at least.
+        Chart with at least one finite point.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def chart_figure(chart: Chart) -> Any:
     return figure
 
 
-_POINTS, _PER_ROW, _LABELS = 6.2, 0.38, 1.9  # inches: panels, a row of the table, its words
+_POINTS, _PER_ROW, _LABELS = 6.2, 0.38, 1.9  # inches: panels, a row of the table, its labels
 
 
 def _wrapped(text: str, width: int) -> str:
@@ -73,7 +73,7 @@ def _wrapped(text: str, width: int) -> str:
 
 
 def floor_of(chart: Chart) -> float:
-    """Least error that is drawn [%]: what lies deep in the reference's own error tells nothing."""
+    """Smallest error that is drawn [%]: errors far below that of the reference mean nothing."""
     if chart.accuracy is None:
         return FLOOR
     return max(FLOOR, 100 * min(chart.remaining, chart.accuracy) * _DEEP)
@@ -117,15 +117,15 @@ def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int) -> Non
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
-    for point in (p for p in finite if p.here):
+    for point in (p for p in finite if p.written):
         place = (point.seconds, shown_error(point, floor))
         label = f"your {chart.subject}"
-        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=HERE_COLOUR, label=label, zorder=5)
+        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=WRITTEN_COLOUR, label=label, zorder=5)
     _legend_below(axes, ncols=columns)
 
 
 def _draw_levels(axes: Any, chart: Chart, floor: float) -> None:
-    """The accuracy asked, and what the reference is off by: at the bottom, and round the limit."""
+    """Requested accuracy, and the error of the reference at the bottom and around the limit."""
     off = 100 * chart.remaining
     if chart.accuracy is not None:
         asked = 100 * chart.accuracy
@@ -140,7 +140,7 @@ def _draw_levels(axes: Any, chart: Chart, floor: float) -> None:
 
 
 def has_band(chart: Chart) -> bool:
-    """Whether what the reference is off by is seen round the accuracy asked."""
+    """Whether the error of the reference is visible around the requested accuracy."""
     return chart.accuracy is not None and chart.remaining > _VISIBLE * chart.accuracy
 
 
@@ -149,7 +149,7 @@ _VISIBLE = 0.1  # of the accuracy
 
 @dataclass(frozen=True, kw_only=True)
 class Ring:
-    """What a choice has round it: whose, its words, colour, and whether it is final."""
+    """Ring around a choice: name of its point, label, colour, and whether it is final."""
 
     name: str
     words: str
@@ -158,7 +158,7 @@ class Ring:
 
 
 def ring_of(chart: Chart, question: str) -> Ring | None:
-    """Round what to take: green where that is final and enough; None where nothing is."""
+    """Ring around the recommendation: green if final and enough; None without one."""
     choice = choice_of(chart, question)
     if choice is None:
         return Ring(name=chart.winner, words=winner_words(chart), colour=WINNER, final=True)
@@ -191,25 +191,25 @@ def _draw_ring(axes: Any, chart: Chart, question: str, finite: list[Point]) -> N
 
 
 def choice_of(chart: Chart, question: str) -> Choice | None:
-    """What to take for a question; None where nothing is recommended."""
+    """Choice for a question; None if there is none."""
     return next((each for each in chart.choices if each.question == question), None)
 
 
-_MARGIN = 0.09  # of the width at either side: numbers stay inside the frame
+_MARGIN = 0.09  # of the width, on either side: keeps numbers inside the frame
 
 
 def _write_names(axes: Any, chart: Chart, question: str) -> None:
-    """Names beside star and reference, numbers beside the front: each where it covers least.
+    """Write names next to star and reference and numbers next to the front, covering least.
 
-    The figure is drawn by then: its layout is what it will be.
+    The figure has been drawn, so that its layout is final.
     """
     floor = floor_of(chart)
     finite = [p for p in chart.of(question) if math.isfinite(p.error) and math.isfinite(p.seconds)]
-    texts = [(p, f"your {chart.subject}", HERE_COLOUR) for p in finite if p.here]
-    texts += [(p, REFERENCE, FRONT) for p in finite if kind_of(p) == REFERENCE and not p.here]
+    texts = [(p, f"your {chart.subject}", WRITTEN_COLOUR) for p in finite if p.written]
+    texts += [(p, REFERENCE, FRONT) for p in finite if kind_of(p) == REFERENCE and not p.written]
     texts += [(p, str(i), FRONT) for i, p in enumerate(chart.numbered(question), start=1)]
     ring = ring_of(chart, question)
-    large = [p.here or (ring is not None and p.name == ring.name) for p in finite]
+    large = [p.written or (ring is not None and p.name == ring.name) for p in finite]
     marks = [
         _box(axes, p, floor, _STAR if more else _DOT) for p, more in zip(finite, large, strict=True)
     ]
@@ -219,19 +219,19 @@ def _write_names(axes: Any, chart: Chart, question: str) -> None:
         taken.append(_write(axes, place, text, colour, marks, taken))
 
 
-_STAR, _DOT = 12.0, 4.0  # px at a hundred to the inch: half of what names must not cover
+_STAR, _DOT = 12.0, 4.0  # px at 100 dpi: half the width that names must not cover
 
 
 def _box(axes: Any, point: Point, floor: float, half: float) -> Any:
-    """What a point takes of the picture."""
+    """Area that a point covers in the picture."""
     from matplotlib.transforms import Bbox
 
     centre = axes.transData.transform((point.seconds, shown_error(point, floor)))
     return Bbox.from_extents(*(centre - half), *(centre + half))
 
 
-def apart(box: Any, place: Any) -> float:
-    """Distance of a place from a box [px]."""
+def distance_to_box(box: Any, place: Any) -> float:
+    """Distance of a position from a box [px]."""
     return math.dist(_nearest_to(box, place), place)
 
 
@@ -243,9 +243,10 @@ def _write(
     marks: list[Any],
     taken: list[Any],
 ) -> Any:
-    """Write beside a place, where that covers least and no other mark is as near; its box.
+    """Write next to a point, on the side that covers least and is nearest to no other mark.
 
-    Where there is no such side it stands farther off, at the end of a thin line.
+    If there is no such side, the text stands farther away, at the end of a thin line. Return the
+    box of the text.
     """
     from matplotlib.lines import Line2D
     from matplotlib.path import Path
@@ -265,7 +266,7 @@ def _write(
     note.set_in_layout(False)
     frame, own = axes.get_window_extent(), axes.transData.transform(place)
     centres = [0.5 * (mark.p0 + mark.p1) for mark in marks]
-    numbered = text.isdecimal()  # other names tell by themselves what they are of
+    numbered = text.isdecimal()  # other names explain themselves
     others = [i for i, at in enumerate(centres) if numbered and math.dist(at, own) > 1]
 
     def put(side: tuple[str, str], far: float) -> Any:
@@ -274,7 +275,7 @@ def _write(
         return note.get_window_extent()
 
     def costs(at: tuple[tuple[str, str], float]) -> tuple[int, float]:
-        """What is covered, or taken for the name of something else; then the way."""
+        """Number of marks that are covered or could be misread as labelled; then the distance."""
         box = put(*at)
         outside = bool(box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0)
         count = int(box.count_overlaps(taken)) + len(taken) * outside
@@ -282,8 +283,8 @@ def _write(
             line = Path([own, _nearest_to(box, own)])
             crossed = [marks[i] for i in others] + taken[len(marks) :]
             return count + sum(line.intersects_bbox(each, filled=True) for each in crossed), at[1]
-        reach = _CLEARLY * apart(box, own)
-        return count + sum(apart(box, centres[i]) < reach for i in others), at[1]
+        reach = _CLEARLY * distance_to_box(box, own)
+        return count + sum(distance_to_box(box, centres[i]) < reach for i in others), at[1]
 
     side, far = min(
         ((side, far) for far in _FAR[: None if numbered else 1] for side in _SIDES), key=costs
@@ -296,28 +297,28 @@ def _write(
 
 
 def _nearest_to(box: Any, place: Any) -> tuple[float, float]:
-    """Where a box is nearest to a place."""
+    """Point of a box that is nearest to a position."""
     x, y = place
     return min(max(x, box.x0), box.x1), min(max(y, box.y0), box.y1)
 
 
-_FAR = (1.0, 2.0, 3.0, 5.0)  # times the next place beside a point
+_FAR = (1.0, 2.0, 3.0, 5.0)  # times the offset next to a point
 _CLEARLY = 1.3  # times as far from any other point as from its own
 _ASIDE = {"left": 8, "right": -8, "center": 0, "bottom": 5, "top": -5}  # points
 _SIDES = [(across, up) for up in ("bottom", "top") for across in ("left", "right", "center")]
 
 
 def _highest(chart: Chart, points: Sequence[Point]) -> float:
-    """Largest error that is drawn, or the accuracy asked [%]."""
+    """Largest error that is drawn, or the requested accuracy [%]."""
     errors = [shown_error(p, FLOOR) for p in points if math.isfinite(p.error)]
     return max([*errors, 100 * (chart.accuracy or 0.0), FLOOR])
 
 
-_HEADROOM = 2.5  # of the error axis: the highest number stays inside the frame
+_HEADROOM = 2.5  # of the error axis: keeps the highest number inside the frame
 
 
 def _legend_below(axes: Any, ncols: int) -> None:
-    """Where no point can lie under it; none where time was too short for any point."""
+    """Draw the legend below the axes, where it covers no point; none without any points."""
     if not axes.get_legend_handles_labels()[0]:
         return
     axes.legend(
@@ -326,7 +327,7 @@ def _legend_below(axes: Any, ncols: int) -> None:
 
 
 def winner_words(chart: Chart) -> str:
-    """What the ring round a point says."""
+    """Label of the ring around a point."""
     if chart.accuracy is None:
         return "fastest within the standard error of the best"
     return "cheapest within the accuracy"
@@ -335,20 +336,20 @@ def winner_words(chart: Chart) -> str:
 _KINDS: dict[str, dict[str, Any]] = {
     BEST: {"marker": "o", "ms": 8, "color": FRONT},
     BEATEN: {"marker": "o", "ms": 5, "color": OTHER},
-    UNTOLD: {"marker": "s", "ms": 6, "mfc": "none", "color": DOUBTFUL},
+    UNDECIDED: {"marker": "s", "ms": 6, "mfc": "none", "color": DOUBTFUL},
     REFERENCE: {"marker": "o", "ms": 8, "mfc": "white", "color": FRONT},
 }
 
 
 def kind_of(point: Point) -> str:
-    """How a point is drawn, in the words of the legend."""
+    """Kind of a point, in the words of the legend."""
     if point.verdict in ("doubtful", "reference"):
-        return UNTOLD if point.verdict == "doubtful" else REFERENCE
+        return UNDECIDED if point.verdict == "doubtful" else REFERENCE
     return BEST if point.on_front else BEATEN
 
 
 def _draw_point(axes: Any, point: Point, number: int, floor: float) -> None:
-    """One point with its standard error, under an id that the page gives a name to."""
+    """Draw one point with its standard error, under an id to which the page adds a name."""
     error = 100 * point.standard_error
     if math.isfinite(error) and error > 0:
         value = shown_error(point, floor)
@@ -361,7 +362,7 @@ def _draw_point(axes: Any, point: Point, number: int, floor: float) -> None:
 
 
 def _draw_quantities(axes: Any, chart: Chart) -> None:
-    """Errors of every quantity, as a table of colours."""
+    """Draw the errors of every quantity as a coloured table."""
     points, names = _table(chart)
     if not names:
         axes.set_axis_off()
@@ -389,7 +390,7 @@ def _draw_quantities(axes: Any, chart: Chart) -> None:
 
 
 def _grounds(chart: Chart, values: Any) -> Any:
-    """Colours of errors [%] [shape=(..., 4)]: red above an accuracy that is asked, else by size."""
+    """Colours of errors [%] [shape=(..., 4)]: red above a requested accuracy, else by size."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm, to_rgba
 
@@ -405,15 +406,15 @@ def _grounds(chart: Chart, values: Any) -> Any:
 
 
 def close_to(chart: Chart) -> float:
-    """Errors that near to the accuracy are too close to call [%]: what is seen of two digits."""
+    """Distance from the accuracy that is too close to call [%]: at least two-digit resolution."""
     return 100 * max(chart.remaining, _LAST_DIGIT * (chart.accuracy or 0.0))
 
 
 _LAST_DIGIT = 0.01
-PALE = "#fbe8e6"  # of the band round the accuracy
+PALE = "#fbe8e6"  # of the band around the accuracy
 
 
-_PALEST, _DEEPER = 0.2, 0.4  # of the colours: figures stay legible in black
+_PALEST, _DEEPER = 0.2, 0.4  # of the colours: keeps numbers legible in black
 
 
 def _unit(chart: Chart) -> str:
@@ -421,7 +422,7 @@ def _unit(chart: Chart) -> str:
 
 
 def _table_points(chart: Chart) -> list[tuple[str, Point]]:
-    """Rows of the table: where one stands and what to take; else the front, its most accurate."""
+    """Rows of the table: scene as written and choices; else the most accurate of the front."""
     if not chart.choices:
         numbered = [(f"{i} {p.name}", p) for i, p in enumerate(chart.front, start=1)]
         return numbered[-_MOST_ROWS:]
@@ -430,16 +431,16 @@ def _table_points(chart: Chart) -> list[tuple[str, Point]]:
         against = ", against the same rungs" if choice.question in chart.error_labels else ""
         for point in (p for p in chart.of(choice.question) if p.errors):
             known = any(point.rungs == p.rungs and point.errors == p.errors for _, p in rows)
-            if not known and (point.here or point.name == choice.name):
+            if not known and (point.written or point.name == choice.name):
                 rows.append((f"{point.name}{against}", point))
     return rows
 
 
 def _table(chart: Chart) -> tuple[list[tuple[str, Point]], list[str]]:
-    """Points of the table, and its quantities: those of the subject as written, the worst first."""
+    """Points and quantities of the table, by decreasing error of the subject as written."""
     points = _table_points(chart)
     names = list(dict.fromkeys(name for _, point in points for name in point.errors))
-    own = [point for _, point in points if point.here]
+    own = [point for _, point in points if point.written]
     if own:
         names.sort(key=lambda name: -own[-1].errors[name].error if name in own[-1].errors else 0.0)
     return points, names
@@ -455,7 +456,7 @@ def _percent(value: float) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class ShadedCell:
-    """An error in the table of a page, on the colour that the picture gives it."""
+    """An error in the table of a page, with the background colour of the picture."""
 
     text: str
     ground: str
@@ -476,7 +477,7 @@ def question_figure(chart: Chart, question: str) -> Any:
 
 
 def question_images(chart: Chart) -> list[PageImage]:
-    """A picture of points for each question; a point tells its name under the pointer."""
+    """Picture of points for each question; the pointer shows the name of a point."""
     images = []
     for question in chart.shown or ("",):
         figure = question_figure(chart, question)
@@ -491,11 +492,11 @@ def question_images(chart: Chart) -> list[PageImage]:
     return images
 
 
-_MOST_PX = 760  # width of points in a page
+_MOST_PX = 760  # largest width of a picture of points in a page
 
 
 def shaded_rows(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]]:
-    """Heads and rows of the errors by quantity, in the colours of the picture."""
+    """Headings and rows of the errors by quantity, in the colours of the picture."""
     from matplotlib.colors import to_hex
 
     points, names = _table(chart)
@@ -535,7 +536,7 @@ def _errors(points: list[tuple[str, Point]], names: list[str]) -> Any:
 
 
 def chart_svg(chart: Chart) -> str:
-    """The figure as SVG whose points tell their names under the pointer.
+    """The figure as SVG; the pointer shows the names of points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Speed against accuracy of the diagnosis: features times models, on machines held out."""
+"""Speed against accuracy of the diagnosis: features times models, on held-out machines."""
 
 import math
 import time
@@ -23,7 +23,7 @@ from .chart import Chart, Clock, Point, front_of
 Float = NDArray[np.float64]
 
 _FOLDS = 5
-_RUNS = 3  # of everything that is timed; the least counts
+_RUNS = 3  # of everything that is timed; the shortest counts
 _TIMED = 3  # recordings
 _TREES = 100
 
@@ -44,7 +44,7 @@ FEATURE_GROUPS: dict[str, tuple[str, ...]] = {
     "orbit": ("centreline", "largest_excursion", "filtered_orbits", "orbit_shapes", "whirl"),
     "all": (),
 }
-"""Group -> rows of the catalogue; all of them where none is named."""
+"""Group -> rows of the catalogue; an empty group stands for all rows."""
 
 
 def _ridge(_seed: int) -> Any:
@@ -72,7 +72,7 @@ MODELS: dict[str, Callable[[int], Any]] = {
     "extra-trees": _extra_trees,
     "boosting": _boosting,
 }
-"""Regressions of log severity. A new candidate is one row."""
+"""Regressors of log severity. A new candidate is one row."""
 
 
 def model_chart(
@@ -91,11 +91,11 @@ def model_chart(
     path : str or Path
         Data set with a severity and its condemning limit.
     seed : int
-        Of folds and models.
+        Seed of folds and models.
     jobs : int
         Worker processes for the features.
     budget : float, optional
-        Seconds after which no further candidate is begun.
+        Time after which no further candidate is started [s].
     clock : callable
         Seconds.
     progress : callable, optional
@@ -104,9 +104,9 @@ def model_chart(
     Returns
     -------
     Chart
-        Cost: features and estimate of one recording, the least of several runs. Error: mean
-        absolute error of the first severity over the condemning limit, by folds of whole machine
-        draws; its standard error is that over draws. Errors of each true grade beside it.
+        Cost: features and estimate of one recording, the shortest of several runs. Error: mean
+        absolute error of the first severity over the condemning limit, in folds of whole machine
+        draws, with its standard error over draws; also for each true grade.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def model_chart(
 def _groups(
     sample: Recording, names: Sequence[str]
 ) -> Iterator[tuple[str, tuple[str, ...], NDArray[np.intp]]]:
-    """Name, rows of the catalogue and columns of every group that a recording has."""
+    """Name, catalogue rows and columns of every group that a recording supports."""
     layout = recording_layout(sample)
     absent = absent_features(layout, "standard")
     present = [row["name"] for row in catalogue("standard") if row["name"] not in absent]
@@ -171,7 +171,7 @@ def _names_of(layout: Layout, rows: Sequence[str]) -> tuple[str, ...]:
 
 
 def _feature_seconds(samples: Sequence[Recording], rows: Sequence[str], clock: Clock) -> float:
-    """Least time of these rows of one recording [s]."""
+    """Shortest time for these rows of one recording [s]."""
     return min(_once(sample, rows, clock) for sample in samples for _ in range(_RUNS))
 
 
@@ -239,7 +239,7 @@ MEAN = "mean"
 
 
 def _over_draws(error: Float, draws: NDArray[Any]) -> Difference:
-    """Mean error, its standard error from the means of the draws, which share a machine."""
+    """Mean error, and its standard error from the means of the draws, each of one machine."""
     means = np.array([error[draws == draw].mean() for draw in np.unique(draws)])
     spread = float(means.std(ddof=1) / math.sqrt(len(means))) if len(means) > 1 else math.inf
     return Difference(mean=float(error.mean()), standard_error=spread)
@@ -263,7 +263,7 @@ def _finished(name: str, points: list[Point], late: list[str], table: FeatureTab
     verdict = "no winner: nothing ran within the budget"
     if best is not None:
         verdict = (
-            f"the least error {best.error:.1%} of the limit: {best.name}; the fastest within its "
+            f"smallest error {best.error:.1%} of the limit: {best.name}; fastest within its "
             f"standard error of {best.standard_error:.1%}: {fair[0].name}, {fair[0].error:.1%} in "
             f"{1e3 * fair[0].seconds:.3g} ms"
         )

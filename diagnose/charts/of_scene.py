@@ -1,4 +1,4 @@
-"""Chart of a scene: where it stands, and what would be enough, with and without other rungs."""
+"""Chart of a scene: its accuracy, and sufficient settings with and without other rungs."""
 
 import hashlib
 import json
@@ -51,23 +51,23 @@ from .words import (
     time_words,
 )
 
-_PAUSE = 2.0  # s between two writings of the runs that are kept
-_SLACK = 0.9  # of the budget: what runs may take, the rest is for the page
+_PAUSE = 2.0  # s between two writes of the kept runs
+_SLACK = 0.9  # share of the budget for runs; the rest is for the page
 
 
 def kept_runs(path: Path | None, scene: Scene) -> Kept[Outcome]:
-    """Runs of a scene in a file beside the output.
+    """Runs of a scene, kept in a file next to the output.
 
     Parameters
     ----------
     path : Path or None
-        None keeps nothing.
+        None: nothing is kept.
     scene : Scene
 
     Raises
     ------
     DataError
-        The file is damaged, or of another scene or version.
+        The file is damaged, or belongs to another scene or version.
     """
     table = json.dumps(scene.model_dump(mode="json"), sort_keys=True)
     return Kept(
@@ -93,25 +93,25 @@ def scene_search(
     clock: Clock = time.perf_counter,
     kept: Kept[Outcome] | None = None,
 ) -> Search:
-    """Search over the rungs of a scene, nothing measured yet.
+    """Search over the rungs of a scene; nothing is measured yet.
 
     Parameters
     ----------
     scene : Scene
-        Its own fidelity plays no part; what it pins stays as written.
+        Its fidelity setting is ignored; pinned rungs stay as written.
     accuracy : float, optional
-        Error that every quantity of interest may carry; the scene's own by default.
+        Largest error of any quantity of interest; by default that of the scene.
     jobs : int
         Worker processes; the errors do not depend on it.
     clock : callable
-        Seconds; importable by name where there are workers.
+        Time [s]; importable by name if there are workers.
     kept : Kept, optional
         Runs of an earlier search; new ones are added.
 
     Raises
     ------
     SceneError
-        A pinned name is no effect.
+        A pinned name is not an effect.
     ValueError
         The accuracy is out of bounds.
     """
@@ -134,15 +134,15 @@ def scene_search(
 def measure(
     search: Search, *, budget: float | None = None, clock: Clock = time.perf_counter
 ) -> None:
-    """Let a search measure, for so many seconds at most.
+    """Let a search measure within a time budget.
 
     Parameters
     ----------
     search : Search
     budget : float, optional
-        Seconds; the first answer is measured in any case.
+        Time [s]; the first answer is measured in any case.
     clock : callable
-        Seconds.
+        Time [s].
     """
     end = math.inf if budget is None else clock() + _SLACK * budget
     with threadpool_limits(1):  # as in a worker: the same sums in the same order
@@ -156,14 +156,14 @@ def scene_chart(
     budget: float | None = None,
     jobs: int = 1,
 ) -> Chart:
-    """Measure where a scene stands, and what would be enough.
+    """Measure the accuracy of a scene, and find sufficient settings.
 
     Parameters
     ----------
     scene, accuracy, jobs
-        As :func:`scene_search`.
+        As in :func:`scene_search`.
     budget : float, optional
-        As :func:`measure`.
+        As in :func:`measure`.
 
     Returns
     -------
@@ -198,10 +198,10 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     points = tuple(p for name, a in answers.items() for p in _points(scene, found, a, name))
     choices = tuple(_choice(scene, found, a, name) for name, a in answers.items())
     final = [c for c in choices if c.status == "resolved"]
-    where = (standing(scene, found), *filter(None, [costly_rungs(scene, found)]))
+    present = (standing(scene, found), *filter(None, [costly_rungs(scene, found)]))
     alike, best = why_alike(found), best_already(found)
-    told = [choices[-1]] if alike else choices
-    conclusion = (*where, *(c.sentence for c in told))
+    distinct = [choices[-1]] if alike else choices
+    conclusion = (*present, *(c.sentence for c in distinct))
     return Chart(
         name=scene.name,
         title=f"{scene.name} (simulated): how much model does this scene need?",
@@ -235,7 +235,7 @@ def chart_of(scene: Scene, found: Study) -> Chart:
 
 
 def _varied(answer: Answer) -> str:
-    """What differs among the candidates of an answer, in words."""
+    """Effects that differ among the candidates of an answer, in words."""
     rungs = [each.rungs.items() for each in answer.candidates]
     pairs = dict.fromkeys(pair for each in rungs for pair in each)
     names = [effect for effect, _ in pairs]
@@ -243,7 +243,7 @@ def _varied(answer: Answer) -> str:
 
 
 def _numerical(found: Study) -> dict[str, str]:
-    """The error axis of what is not against the best rungs."""
+    """Labels of error axes whose reference is not the best rungs."""
     if found.raised is None or best_already(found):
         return {}
     return {KEPT: "numerical error, against the same rungs [%]"}
@@ -269,7 +269,7 @@ def _own_words(scene: Scene, found: Study) -> str:
 
 
 def _left_words(found: Study) -> str:
-    """What an unfinished search still takes; empty where that is not known."""
+    """Remaining time of an unfinished search; empty if unknown."""
     if found.status != "out of budget" or not found.seconds_left > 0:
         return ""
     return f"some {time_words(found.seconds_left)} more of one processor core"
@@ -280,32 +280,32 @@ def _note(scene: Scene, found: Study) -> str:
     cut, slow = "", ""
     if found.duration is not None:
         cut = f", cut from {scene.duration:g} s for more starts"
-        slow = "; a choice is confirmed on whole ones, as a motion may change over seconds"
+        slow = "; a choice is confirmed on whole ones, because motion may change over seconds"
     return (
-        f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling{slow}. "
-        "Times are by the cost tables, as is the choice, scaled so that the scene as written takes "
-        "its measured time; the measured ones, which scatter, are in the JSON"
+        f"{found.duration or scene.duration:.3g} s per run{cut}, plus settling{slow}. "
+        "Times and choices are based on the cost tables, scaled so that the scene as written takes "
+        "its measured time; the measured times, which scatter, are in the JSON"
     )
 
 
 def _rate(seconds: float, scene: Scene, found: Study) -> float:
-    """Time of a simulated second of a scene, by the measured time of a run [s]."""
+    """Time per simulated second of a scene, from the measured time of a run [s]."""
     return seconds / found.share / scene.duration
 
 
 def _cost_rate(each: Candidate, scene: Scene, found: Study) -> float:
-    """The same by the tables, in measured times of the scene as written [s]."""
+    """Time per simulated second by the cost tables, scaled to the scene as written [s]."""
     own = found.kept.written
     scale = math.nan if own is None else own.seconds / own.cost
     return _rate(scale * each.cost, scene, found)
 
 
 REFERENCE = "reference"
-"""Name of the point with the best rungs that a question admits, and the finest numerics."""
+"""Name of the point with the best rungs that a question allows and the finest numerics."""
 
 
 def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterator[Point]:
-    """The scene as written first, then the cheapest first."""
+    """Points of an answer: the scene as written, then by increasing cost."""
     rates = [_cost_rate(each, scene, found) for each in answer.candidates]
     errors = [math.inf if c.verdict == "doubtful" else c.error for c in answer.candidates]
     front = front_of(list(zip(rates, errors, strict=True)))
@@ -313,7 +313,7 @@ def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterat
     rows.sort(key=lambda row: row[0].rungs != found.written)
     for each, rate, on_front in rows:
         best = each.rungs == answer.reference.rungs
-        here = each.rungs == found.written
+        written = each.rungs == found.written
         name = combination_words(each, found.written)
         yield Point(
             name=name,
@@ -326,14 +326,14 @@ def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterat
             starts=each.starts,
             on_front=on_front or (each.rungs == answer.chosen.rungs and each.verdict == "within"),
             question=question,
-            here=here,
-            block=f"# {scene.name}: {name}" if here else _point_block(scene, each, name),
+            written=written,
+            block=f"# {scene.name}: {name}" if written else _point_block(scene, each, name),
             measured_seconds=_rate(each.seconds, scene, found),
         )
 
 
 def _point_block(scene: Scene, each: Candidate, name: str) -> str:
-    """What a scene must change to be this point."""
+    """TOML block that turns the scene into this point."""
     before = values_before(scene, each.values)
     changes = {path: value for path, value in each.values.items() if before[path] != value}
     head = f"# {scene.name}: {name}"
@@ -348,7 +348,7 @@ def _reason(each: Candidate, scene: Scene) -> str:
 
 
 def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice:
-    """What to take for a question, with its certainty."""
+    """Recommendation for a question, with its certainty."""
     chosen = answer.chosen
     name = combination_words(chosen, found.written)
     same_changes = not answer.changes
@@ -384,7 +384,7 @@ def _reference_words(answer: Answer) -> str:
 
 
 def _commented(scene: Scene, found: Study, answer: Answer) -> str:
-    """Block to paste, with what it is above it."""
+    """Block to paste, headed by a comment that describes it."""
     if not answer.changes:
         return ""
     name = change_words(scene, found, answer.chosen)
@@ -397,7 +397,7 @@ _STEP = "numerics.step"
 
 
 def _rung_costs(scene: Scene, found: Study) -> Iterator[RungCost]:
-    """The largest error first; what could not be compared last."""
+    """Errors of the rungs, the largest first; those without comparison last."""
     known = [math.isfinite(each.candidate.error) for each in found.raises]
     order = [-e.candidate.error if k else 1.0 for e, k in zip(found.raises, known, strict=True)]
     for i in sorted(range(len(order)), key=order.__getitem__):

@@ -1,4 +1,4 @@
-"""Page of a chart, and the forms in which it is written."""
+"""Page of a chart, and its output formats."""
 
 import itertools
 import math
@@ -34,17 +34,17 @@ from .figure import (
 from .points import chart_points
 from .words import percent, with_scatter
 
-_ROW_BYTES = 3_000  # of a point in the tables of a page
+_ROW_BYTES = 3_000  # per point in the tables of a page
 
 
 def chart_html(chart: Chart, *, interactive: bool = False) -> str:
-    """One self-contained page: verdict, picture with named points, tables.
+    """A self-contained page: verdict, picture with named points, tables.
 
     Parameters
     ----------
     chart : Chart
     interactive : bool
-        Points to zoom in and to tap for their settings.
+        Let the reader zoom in and tap points for their settings.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
 
 
 def _lines(chart: Chart) -> list[tuple[str, bool]]:
-    """The conclusion; whether a line says where the subject stands, or what to do about it."""
+    """Lines of the conclusion; True for the finding on the subject and for advice."""
     lines = chart.conclusion or (chart.verdict,)
     advice = [c.sentence for c in chart.shown_choices if c.enough and c.status in RECOMMENDED]
     first = {lines[0], *[line for line in advice if line.startswith("We recommend")]}
@@ -95,17 +95,17 @@ def _lines(chart: Chart) -> list[tuple[str, bool]]:
 
 
 def _error_of(each: Point | Choice | RungCost) -> str:
-    """Its error with what is known of the scatter."""
+    """Error with its scatter, if known."""
     return _unbroken(with_scatter(each.error, each.standard_error, each.starts))
 
 
 def _unbroken(text: str) -> str:
-    """Text whose figures are not torn from their signs at the end of a line."""
+    """Text with non-breaking spaces between numbers and signs."""
     return text.replace(" %", "\u00a0%").replace(" ± ", "\u00a0±\u00a0")
 
 
 def _shaded(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]]:
-    """Errors by quantity; of a scene, whose quantities are many, a quantity a row."""
+    """Errors by quantity; for a scene, which has many quantities, one row per quantity."""
     names, rows = shaded_rows(chart)
     if not chart.choices or not rows:
         return names, rows
@@ -116,9 +116,9 @@ def _shaded(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]
 
 
 def _cards(chart: Chart) -> list[tuple[Choice, str, bool, bool]]:
-    """Choices; the head of each; whether the one before has the same settings; its width.
+    """Choices with heading, whether the previous one has the same settings, and full width.
 
-    Settings stand beside each other where there are two, else across the page without a blank.
+    Two settings are shown side by side, a single one across the page.
     """
     shown = chart.shown_choices
     again = [
@@ -135,7 +135,7 @@ def _cards(chart: Chart) -> list[tuple[Choice, str, bool, bool]]:
 
 
 def _head(chart: Chart, choice: Choice) -> str:
-    """What to do about a question; optional where the scene as written is within the accuracy."""
+    """Heading with the advice on a question."""
     if not choice.enough:
         return f"No numerical setting reaches {percent(chart.accuracy or 0.0)} with your rungs"
     name = choice.words or choice.name
@@ -144,7 +144,7 @@ def _head(chart: Chart, choice: Choice) -> str:
     elif choice.keeps:
         text = "nothing to change"
     elif choice.optional:
-        text = f"nothing must change; {name} would do too"
+        text = f"nothing must change; {name} is sufficient too"
     else:
         text = f"take {name}"
     text = f"{text}; {chart.alike}" if chart.alike else f"{choice.question}: {text}"
@@ -152,7 +152,7 @@ def _head(chart: Chart, choice: Choice) -> str:
 
 
 def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, str]]:
-    """Number in the picture, point, its look: taken, and coarse where that is not enough."""
+    """Number in the picture, point, and style: taken, and coarse if that is not enough."""
     numbers: dict[int, int] = {id(p): i for i, p in enumerate(chart.numbered(question), start=1)}
     choice = choice_of(chart, question)
     wanted = choice.name if choice else None
@@ -161,7 +161,7 @@ def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, str]]:
 
 
 def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: bool = False) -> None:
-    """Write a chart in the form that the suffix asks for, whole or not at all.
+    """Write a chart in the format of the suffix, atomically.
 
     Parameters
     ----------
@@ -171,12 +171,12 @@ def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: boo
     force : bool
         Replace an existing file.
     interactive : bool
-        As of :func:`chart_html`; of no matter to other forms.
+        As in :func:`chart_html`; ignored by other formats.
 
     Raises
     ------
     KeyError
-        Another suffix.
+        The suffix is none of these.
     DataError
         Bokeh is not installed for an interactive page.
     """

@@ -1,4 +1,4 @@
-"""Points of a chart for a page to zoom in: what is drawn, under the pointer and at a tap."""
+"""Points of a chart for an interactive page: marks, tooltips and texts on tapping."""
 
 import math
 from collections.abc import Iterator
@@ -10,10 +10,10 @@ from .figure import (
     BEST,
     DOUBTFUL,
     FRONT,
-    HERE_COLOUR,
     OTHER,
     REFERENCE,
-    UNTOLD,
+    UNDECIDED,
+    WRITTEN_COLOUR,
     floor_of,
     kind_of,
     ring_of,
@@ -24,7 +24,7 @@ from .words import with_scatter
 _LOOKS = {
     BEST: (FRONT, 10.0, True),
     BEATEN: (OTHER, 8.0, True),
-    UNTOLD: (DOUBTFUL, 8.0, False),
+    UNDECIDED: (DOUBTFUL, 8.0, False),
     REFERENCE: (FRONT, 10.0, False),
 }
 """Colour, size [px] and filling of each kind."""
@@ -40,7 +40,7 @@ def chart_points(chart: Chart) -> list[PointAxes]:
     Returns
     -------
     list of PointAxes
-        Without points that never ran or have no error.
+        Points that did not run or have no error are left out.
     """
     return [_points(chart, question) for question in chart.shown]
 
@@ -69,19 +69,19 @@ def _points(chart: Chart, question: str) -> PointAxes:
 
 
 def _series(chart: Chart, question: str, finite: list[Point]) -> Iterator[Series]:
-    """Plain points by their kind; rings below and a star above them."""
+    """Plain points by kind, with rings below and a star above them."""
     ring = ring_of(chart, question)
     for name, (colour, size, filled) in _LOOKS.items():
-        marks = tuple(_mark(chart, p) for p in finite if kind_of(p) == name and not p.here)
+        marks = tuple(_mark(chart, p) for p in finite if kind_of(p) == name and not p.written)
         if marks:
             yield Series(name=name, marks=marks, colour=colour, size=size, filled=filled)
     taken = tuple(_mark(chart, p) for p in finite if ring is not None and p.name == ring.name)
     if ring is not None and taken:
         yield Series(name=ring.words, marks=taken, colour=ring.colour, size=22.0, filled=False)
-    here = tuple(_mark(chart, p) for p in finite if p.here)
-    if here:
+    written = tuple(_mark(chart, p) for p in finite if p.written)
+    if written:
         words = f"your {chart.subject}"
-        yield Series(name=words, marks=here, colour=HERE_COLOUR, marker="star", size=18.0)
+        yield Series(name=words, marks=written, colour=WRITTEN_COLOUR, marker="star", size=18.0)
 
 
 def _mark(chart: Chart, point: Point) -> Mark:

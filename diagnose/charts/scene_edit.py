@@ -1,4 +1,4 @@
-"""Values written into the TOML text of a scene: as a block to paste, or into a file."""
+"""Write values into the TOML text of a scene: as a block to paste, or into a file."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -15,11 +15,11 @@ from ...sim.scene.scene import Scene, SceneError
 from .words import short_time
 
 _HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]+?)\s*\]{1,2}\s*(#.*)?$")
-_VALUE = r"(\"[^\"]*\"|'[^']*'|[^#]*?)"  # of one line
+_VALUE = r"(\"[^\"]*\"|'[^']*'|[^#]*?)"  # on one line
 
 
 def written_value(scene: Scene, path: str) -> Any:
-    """Value of a scene at a dotted path; None where it leaves that to the program."""
+    """Value of a scene at a dotted path; None if it is left to the program."""
     try:
         return value_at(scene, path)
     except (AttributeError, KeyError, IndexError, ValueError):
@@ -38,14 +38,14 @@ def block_of(
     changes : mapping of str to object
         Dotted path -> number or text; entries of lists by their number.
     before : mapping of str to object, optional
-        The same paths -> what stands there now, for a comment behind each line.
+        The same paths -> present value, for a comment after each line.
     defaults : mapping of str to object, optional
-        Path -> value that the program takes where nothing stands there.
+        Path -> value that the program uses if none is given.
 
     Returns
     -------
     str
-        Values in lists of tables, which no table can be added to, as lines of comment.
+        Values in lists of tables are written as comments, because tables cannot be added there.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def _lines(
     before: Mapping[str, Any] | None,
     defaults: Mapping[str, Any],
 ) -> str:
-    """Lines of a table, each with what it replaces."""
+    """Lines of a table, each with the value it replaces."""
     rows = []
     for key, value in values.items():
         line = toml_text({key: value}).strip()
@@ -100,11 +100,11 @@ def _lines(
     return "".join(rows)
 
 
-_STEP = "numerics.step"  # [s], of microseconds
+_STEP = "numerics.step"  # [s], in the range of microseconds
 
 
 def _was(path: str, value: Any, old: Any, default: Any) -> str:
-    """What a value replaces; of what was not set, what the program took."""
+    """Comment on the value that is replaced, or on the default if none was set."""
     words = short_time if path == _STEP else _plain
     if default is not None and old is None and words(default) == words(value):
         return f"{words(value)}: the default, written out because the default depends on the rungs"
@@ -121,7 +121,7 @@ def _plain(value: Any) -> str:
 
 
 def options_of(changes: Mapping[str, Any]) -> str:
-    """The same as options of the command line.
+    """Changes as options of the command line.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def options_of(changes: Mapping[str, Any]) -> str:
 
 
 def with_changes(text: str, changes: Mapping[str, Any]) -> str:
-    r"""Text of a scene with values replaced or added; the rest, comments too, stays.
+    r"""Text of a scene with values replaced or added; everything else, including comments, stays.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def with_changes(text: str, changes: Mapping[str, Any]) -> str:
 
 
 def _put(lines: list[str], path: Sequence[str], value: Any) -> None:
-    """Replace the value where it stands, else add it to its table, else add the table."""
+    """Replace an existing value, else add it to its table, else add the table."""
     places = _sections(lines)
     for split in range(len(path) - 1, -1, -1):
         for first, last in places.get(tuple(path[:split]), []):
@@ -181,7 +181,7 @@ def _put(lines: list[str], path: Sequence[str], value: Any) -> None:
 
 
 def _sections(lines: Sequence[str]) -> dict[tuple[str, ...], list[tuple[int, int]]]:
-    """Lines of every table by its path: from the one below its header to the next header."""
+    """Line ranges of every table by path: from below its header to the next header."""
     found: dict[tuple[str, ...], list[tuple[int, int]]] = {}
     counts: dict[tuple[str, ...], int] = {}
     begin, path = 0, ()  # type: int, tuple[str, ...]
@@ -196,7 +196,7 @@ def _sections(lines: Sequence[str]) -> dict[tuple[str, ...], list[tuple[int, int
 
 
 def _numbered(header: re.Match[str], counts: dict[tuple[str, ...], int]) -> tuple[str, ...]:
-    """Path of a header, with the numbers of the entries of lists of tables."""
+    """Path of a header, with the indices of entries in lists of tables."""
     path: tuple[str, ...] = ()
     keys = [key.strip().strip("\"'") for key in header[2].split(".")]
     for depth, key in enumerate(keys, start=1):
@@ -218,22 +218,22 @@ def apply_changes(
     note: str = "",
     force: bool = True,
 ) -> None:
-    """Write the text of a scene with values replaced, whole or not at all.
+    """Write the text of a scene with values replaced, atomically.
 
     Parameters
     ----------
     source : str
         Built-in name, or file.
     scene : Scene
-        As loaded from it, with `given` in it.
+        Scene as loaded from it, including `given`.
     given : mapping of str to object
-        Values that were given beside the file.
+        Values given in addition to the file.
     changes : mapping of str to object
-        Values to write; rungs stay as they are then.
+        Values to write; they fix the rungs (fidelity = "given").
     path : Path
         TOML file.
     note : str
-        Written at its top.
+        Comment at the top of the file.
     force : bool
         Replace an existing file.
 

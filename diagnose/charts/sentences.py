@@ -1,4 +1,4 @@
-"""Sentences of a scene's chart: where it stands, what to take, and how sure that is."""
+"""Sentences of a scene's chart: its accuracy, the recommendation and its certainty."""
 
 import math
 from typing import cast
@@ -22,7 +22,7 @@ from .decision import (
     why_alike,
 )
 from .words import (
-    HERE,
+    AS_WRITTEN,
     combination_words,
     effect_words,
     error_words,
@@ -35,24 +35,24 @@ from .words import (
 
 
 def change_words(scene: Scene, found: Study, each: Candidate) -> str:
-    """What a candidate has other than the scene, and what the scene has."""
+    """Differences of a candidate from the scene, with the values of the scene."""
     return combination_words(each, found.written, values_before(scene, each.values))
 
 
 def where_it_stands(scene: Scene, found: Study) -> str:
-    """What is known of the error of a scene as written, in a sentence or two.
+    """Known error of a scene as written, in a sentence or two.
 
     Parameters
     ----------
     scene : Scene
     found : Study
-        Finished or not.
+        Finished or unfinished study.
     """
     return " ".join(filter(None, [standing(scene, found), costly_rungs(scene, found)]))
 
 
 def standing(scene: Scene, found: Study) -> str:
-    """Error of a scene as written, as far as it is known."""
+    """Error of a scene as written, as far as known."""
     whole = found.whole
     own = whole.written
     if own is None or (found.raised is None and found.raises):
@@ -65,7 +65,7 @@ def standing(scene: Scene, found: Study) -> str:
     if at_limit(found, own):
         error = f"{two_digits(own.error)}{few_starts(own.error, own.starts)}"
         close = f"{error_words(own, scene, error)}, against {against}"
-        if off > _NO_SMALL_PART * found.accuracy:
+        if off > _NOTABLE * found.accuracy:
             close += f", and the reference may itself be off by {percent(off)}"
         return (
             f"Your scene as written is at the limit of {percent(found.accuracy)}: {close}: too "
@@ -73,19 +73,19 @@ def standing(scene: Scene, found: Study) -> str:
         )
     known = {"within": "within", "beyond": "not within"}
     word = known.get(own.verdict, "not yet known to be within")
-    beside = f" (the reference itself may be {percent(off)} off)"
+    doubt = f" (the reference itself may be {percent(off)} off)"
     return (
         f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
-        f"{error_words(own, scene)}{beside if off > _NO_SMALL_PART * found.accuracy else ''}"
+        f"{error_words(own, scene)}{doubt if off > _NOTABLE * found.accuracy else ''}"
         f"{_cause(found)}."
     )
 
 
-_NO_SMALL_PART = 0.1
+_NOTABLE = 0.1
 
 
 def _best_words(scene: Scene, found: Study) -> str:
-    """What the whole error is against: the best rungs, or what is finer where they are the best."""
+    """Reference of the error: the best rungs, or the finer numerics if the rungs are the best."""
     physical, listed = physical_effects(scene), [each.rungs for each in found.whole.candidates]
     finer = [
         effect_words(effect)
@@ -98,7 +98,7 @@ def _best_words(scene: Scene, found: Study) -> str:
 
 
 def _cause(found: Study) -> str:
-    """Which numerics are to blame, where the rungs are the best and better numerics do."""
+    """Numerics that cause the error, if the rungs are the best and finer numerics suffice."""
     own, chosen = found.whole.written, found.kept.chosen
     if own is None or own.verdict != "beyond" or not best_already(found):
         return ""
@@ -112,7 +112,7 @@ def _cause(found: Study) -> str:
 
 
 def costly_rungs(scene: Scene, found: Study) -> str:
-    """Which rungs of the scene as written cost most, or that none does."""
+    """Rungs of the scene as written with the largest errors, or that none matters."""
     known = [e for e in found.raises if math.isfinite(e.candidate.error)]
     costly = sorted(known, key=lambda each: -each.candidate.error)
     over = [e for e in costly if found.accuracy < e.candidate.error]
@@ -136,7 +136,7 @@ _OPENING = {KEPT: "With your rungs kept", RAISED: "If rungs may change"}
 
 
 def choice_sentence(scene: Scene, found: Study, answer: Answer, question: str, status: str) -> str:
-    """Conclusion about a question."""
+    """Conclusion for a question."""
     opening, chosen, asked = _OPENING[question], answer.chosen, percent(found.accuracy)
     alike = why_alike(found)
     if status == "not converged":
@@ -149,11 +149,11 @@ def choice_sentence(scene: Scene, found: Study, answer: Answer, question: str, s
     name, faster = change_words(scene, found, chosen), _faster(answer, chosen)
     if status == "no answer yet":
         return (
-            f"{opening}: {name} is the safe choice ({faster}); whether anything cheaper does, "
-            f"there is no answer yet: nothing else is known to be within {asked}"
-            f"{_nearest(scene, found, answer)}; more --budget goes on."
+            f"{opening}: {name} is the safe choice ({faster}); whether anything cheaper suffices, "
+            f"is not known yet: nothing else is known to be within {asked}"
+            f"{_nearest(scene, found, answer)}; continue with more --budget."
         )
-    what = "change nothing" if name == HERE else f"take {name}"
+    what = "change nothing" if name == AS_WRITTEN else f"take {name}"
     errs = error_words(chosen, scene)
     if by_default(answer):
         errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
@@ -161,23 +161,25 @@ def choice_sentence(scene: Scene, found: Study, answer: Answer, question: str, s
         both = chosen.verdict == "within" and not by_default(answer)
         errs += f", the reference itself up to {percent(answer.left)}"
         errs += f", both within {asked}" if both else ""
-    faster = "" if name == HERE else f", {faster}"
+    faster = "" if name == AS_WRITTEN else f", {faster}"
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and rungs_too_coarse(found):
         fine, but = _how_fine(found, answer, status)
         if not by_default(answer):
             errs += ", against the finest numerics of the same rungs"
-        numerics = f"your numerics {fine}" if name == HERE else f"{what}; then your numerics {fine}"
+        numerics = f"your numerics {fine}"
+        if name != AS_WRITTEN:
+            numerics = f"{what}; then {numerics}"
         return (
             f"{opening}, no numerical setting reaches {asked}: {numerics} ({errs}{faster}), {but} "
             f"your rungs are not ({_rungs_off(scene, found)}){certain}."
         )
     own = answer.written
-    if name != HERE and surely_enough(found, own):
+    if name != AS_WRITTEN and surely_enough(found, own):
         faster_too = is_faster(chosen.cost, cast(Candidate, own).cost)
-        spare = f"to run faster, {what}" if faster_too else f"{name} would do too"
+        spare = f"to run faster, {what}" if faster_too else f"{name} is sufficient too"
         what = f"nothing needs to change; {spare}"
-    elif name != HERE and own is not None and at_limit(found, own):
+    elif name != AS_WRITTEN and own is not None and at_limit(found, own):
         what = f"to be on the safe side, {what}"
     lead = _lead(found, answer, question)
     why = f"; {alike}" if alike else ""
@@ -185,7 +187,7 @@ def choice_sentence(scene: Scene, found: Study, answer: Answer, question: str, s
 
 
 def _lead(found: Study, answer: Answer, question: str) -> str:
-    """How the sentence of a choice begins: one of them is what is recommended, unless in doubt."""
+    """Beginning of the sentence on a choice: one of them is recommended, unless in doubt."""
     coarse = any(each.candidate.verdict == "beyond" for each in found.raises)
     unsure = answer.status == "so far" and answer.chosen.verdict == "doubtful"
     if not unsure and (why_alike(found) or (question == RAISED and rungs_too_coarse(found))):
@@ -196,12 +198,12 @@ def _lead(found: Study, answer: Answer, question: str) -> str:
 
 
 def _faster(answer: Answer, each: Candidate) -> str:
-    """How its time compares with that of the scene as written."""
+    """Time of a candidate compared with that of the scene as written."""
     return faster_words(each.cost, math.nan if answer.written is None else answer.written.cost)
 
 
 def _one_fewer(scene: Scene, found: Study, answer: Answer) -> str:
-    """What becomes of a choice of several rungs with one of them as written."""
+    """Error of a choice of several rungs if one of them stays as written."""
     changed = _changed_rungs(scene, found, answer.chosen)
     rows = [
         (each.error, changed - own, each.starts)
@@ -219,13 +221,13 @@ def _one_fewer(scene: Scene, found: Study, answer: Answer) -> str:
 
 
 def _changed_rungs(scene: Scene, found: Study, each: Candidate) -> set[tuple[str, str]]:
-    """Rungs of a candidate that the scene as written has not, without its numerics."""
+    """Physical rungs of a candidate that differ from the scene as written."""
     physical = physical_effects(scene)
     return {pair for pair in each.rungs.items() if pair[0] in physical} - set(found.written.items())
 
 
 def _how_fine(found: Study, answer: Answer, status: str) -> tuple[str, str]:
-    """What is known of numerics whose rungs are not fine, and the word between both."""
+    """Assessment of the numerics if the rungs are not fine, and the conjunction."""
     if status != "so far":
         return "are fine", "but"
     if answer.chosen.error <= found.accuracy:
@@ -240,7 +242,7 @@ def _rungs_off(scene: Scene, found: Study) -> str:
 
 
 def _nearest(scene: Scene, found: Study, answer: Answer) -> str:
-    """What of the cheaper errs least, with its scatter; empty where nothing could be run."""
+    """Cheaper candidate with the smallest error, and its scatter; empty if none could be run."""
     cheaper = [c for c in answer.candidates if c.cost < answer.reference.cost and c.differences]
     if not cheaper:
         return ""
@@ -266,14 +268,14 @@ def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
 
 
 def _named(found: Study, answer: Answer) -> tuple[str, str, str]:
-    """What is or seems enough: the choice, or its numerics where its rungs are too coarse."""
+    """Subject of the verdict: the choice, or its numerics if the rungs are too coarse."""
     if answer is found.kept and rungs_too_coarse(found):
         return "the numerics look", "the numerics are", "the numerics may be"
     return "this looks", "this is", "this may be"
 
 
 def _likelihood(scene: Scene, found: Study, answer: Answer) -> str:
-    """How sure it is that a choice of few starts is enough, and what it takes to know."""
+    """Certainty of a choice based on few starts, and the number of starts needed."""
     chosen = answer.chosen
     looks, _, may = _named(found, answer)
     word = looks if chosen.error <= found.accuracy else may
@@ -281,7 +283,7 @@ def _likelihood(scene: Scene, found: Study, answer: Answer) -> str:
     known = f"only an error under {percent(most)}" if most < 1 else "nothing"
     text = f"{word} enough, but after {chosen.starts} starts {known} is certain (at 95 %)"
     if needed > chosen.starts:
-        text += f"; to be sure of {percent(found.accuracy)} takes some {needed} starts"
+        text += f"; certainty at {percent(found.accuracy)} takes some {needed} starts"
     if chosen.error > found.accuracy:
         safe = change_words(scene, found, answer.reference)
         text += f"; {safe} is the safe choice, {_faster(answer, answer.reference)}"

@@ -1,8 +1,7 @@
-"""Chart of a recipe: what training on cheaper rungs saves, and what it costs the verdict.
+"""Chart of a recipe: time saved by training on cheaper rungs, and loss of accuracy.
 
-The waveform may be far off where the verdict is not, and the other way round. Both are measured on
-the same simulated machines (:mod:`.charts.across`): trained on each choice of rungs, judged on the
-best.
+The waveform may be far off while the verdict is not, and vice versa. Both are measured on the same
+simulated machines (:mod:`.charts.across`): trained on each choice of rungs, judged on the best.
 """
 
 import math
@@ -33,22 +32,22 @@ class _Trial:
 
 
 def verdict_chart(sets: RungSets, accuracy: float) -> Chart:
-    """Measure rungs by what training on them costs the wear estimate.
+    """Measure how much training on cheaper rungs degrades the wear estimate.
 
     Parameters
     ----------
     sets : RungSets
-        Of a recipe.
+        Data sets of a recipe.
     accuracy : float
-        Most of the condemning limit that the mean error on unseen machines may rise by [-].
+        Largest rise of the mean error on unseen machines, over the condemning limit [-].
 
     Returns
     -------
     Chart
         Cost: of one record by the tables. Error: rise of the mean absolute error over the
         condemning limit, trained on the point's rungs and judged on the best, against training on
-        the best; paired by machine draws. Measured are the recipe as it is written, each rung by
-        itself, and the cheapest combination of those that do.
+        the best; paired by machine draws. The recipe as written, each rung by itself, and the
+        cheapest combination of sufficient rungs are measured.
 
     Raises
     ------
@@ -63,13 +62,13 @@ def verdict_chart(sets: RungSets, accuracy: float) -> Chart:
         for effect in sets.effects
         for rung in admissible(effect, sets.plain.scene)[:-1]
     ]
-    here = measured.trial(sets.written)
+    written = measured.trial(sets.written)
     chosen = _chosen(measured, singles, accuracy)
-    return _chart(measured, here, chosen, accuracy)
+    return _chart(measured, written, chosen, accuracy)
 
 
 class _Measured:
-    """Trials of one recipe, each made once."""
+    """Trials of one recipe, each run once."""
 
     def __init__(self, sets: RungSets, judge: PairedJudge) -> None:
         self.sets, self.judge = sets, judge
@@ -89,7 +88,7 @@ class _Measured:
         return _Trial(rungs=dict(rungs), name=name, loss=loss, level_change=change)
 
     def _level_change(self, table: FeatureTable) -> float:
-        """Mean change of the levels of bands and orders against the best rungs [dB]."""
+        """Mean change of the levels of bands and orders relative to the best rungs [dB]."""
         best = self.judge.best
         shared, mine, theirs = np.intersect1d(
             table.manifest["record_id"], best.manifest["record_id"], return_indices=True
@@ -102,7 +101,7 @@ class _Measured:
 
 
 def _within(trial: _Trial, accuracy: float) -> bool:
-    """Surely: a loss that scatters as much as the accuracy proves nothing."""
+    """Whether the loss is within the accuracy with certainty, given its scatter."""
     loss = trial.loss.loss
     return bool(
         not trial.loss.reason and loss.mean + _SURE * loss.standard_error <= accuracy
@@ -110,7 +109,7 @@ def _within(trial: _Trial, accuracy: float) -> bool:
 
 
 def _chosen(measured: _Measured, singles: Sequence[_Trial], accuracy: float) -> _Trial:
-    """The cheapest rungs that do each by itself, together; raised until they do together."""
+    """Combine the cheapest rungs that suffice alone; raise them until they suffice together."""
     best, cost = measured.sets.best, measured.sets.cost
     usable = [each for each in singles if _within(each, accuracy)]
     rungs = dict(best)
@@ -124,8 +123,8 @@ def _chosen(measured: _Measured, singles: Sequence[_Trial], accuracy: float) -> 
         lowered = [each for each in usable if _is_part(each, rungs, best)]
         if not lowered:
             return measured.trial(best)
-        dearest = max(lowered, key=lambda each: each.loss.loss.mean)
-        rungs |= {effect: best[effect] for effect in best if dearest.rungs[effect] != best[effect]}
+        worst = max(lowered, key=lambda each: each.loss.loss.mean)
+        rungs |= {effect: best[effect] for effect in best if worst.rungs[effect] != best[effect]}
     return found
 
 
@@ -136,9 +135,9 @@ def _is_part(single: _Trial, rungs: Mapping[str, str], best: Mapping[str, str]) 
 # --- as a chart
 
 
-def _chart(measured: _Measured, here: _Trial, chosen: _Trial, accuracy: float) -> Chart:
+def _chart(measured: _Measured, written: _Trial, chosen: _Trial, accuracy: float) -> Chart:
     trials = list(measured.trials.values())
-    points = [_point(measured, trial, here, accuracy) for trial in trials]
+    points = [_point(measured, trial, written, accuracy) for trial in trials]
     front = front_of([(point.seconds, max(point.error, _NOTHING)) for point in points])
     shown = [replace(p, on_front=f) for p, f in zip(points, front, strict=True)]
     shown.sort(key=lambda point: point.seconds)
@@ -159,7 +158,7 @@ def _chart(measured: _Measured, here: _Trial, chosen: _Trial, accuracy: float) -
         status="resolved",
         winner=chosen.name,
         verdict=choice.sentence,
-        conclusion=(choice.sentence, _here_sentence(here, chosen), _waveform_sentence(trials)),
+        conclusion=(choice.sentence, _own_sentence(written, chosen), _waveform_sentence(trials)),
         choices=(choice,),
         labels={LOSS: LOSS, ERROR: f"{ERROR} on the best rungs"},
         note=(
@@ -171,10 +170,10 @@ def _chart(measured: _Measured, here: _Trial, chosen: _Trial, accuracy: float) -
     )
 
 
-_NOTHING = 1e-5  # of the limit: less than any loss that can be told
+_NOTHING = 1e-5  # of the limit: less than any measurable loss
 
 
-def _point(measured: _Measured, trial: _Trial, here: _Trial, accuracy: float) -> Point:
+def _point(measured: _Measured, trial: _Trial, written: _Trial, accuracy: float) -> Point:
     loss = trial.loss
     found = {} if loss.reason else {LOSS: _rise(loss.loss), ERROR: loss.error}
     verdict = _verdict(trial, measured, accuracy)
@@ -182,11 +181,11 @@ def _point(measured: _Measured, trial: _Trial, here: _Trial, accuracy: float) ->
     if verdict == "doubtful":
         words = (
             f"{percent(_rise(loss.loss).mean)}, standard error "
-            f"{percent(loss.loss.standard_error)}, cannot be told apart from "
+            f"{percent(loss.loss.standard_error)}, cannot be distinguished from "
             f"{percent(accuracy)}: more records (-n); {words}"
         )
     return Point(
-        name=f"{trial.name} (the recipe as written)" if trial is here else trial.name,
+        name=f"{trial.name} (the recipe as written)" if trial is written else trial.name,
         rungs=trial.rungs,
         seconds=measured.sets.cost(trial.rungs),
         errors=found,
@@ -194,13 +193,13 @@ def _point(measured: _Measured, trial: _Trial, here: _Trial, accuracy: float) ->
         reason=words,
         counts=LOSS if found else "",
         question=QUESTION,
-        here=trial is here,
+        written=trial is written,
         block=f"# scene values: {trial.name}\n{block_of(measured.sets.values(trial.rungs))}",
     )
 
 
 def _rise(loss: Difference) -> Difference:
-    """A gain is chance: no rise."""
+    """Rise of the error; a gain is attributed to chance and counts as zero."""
     return replace(loss, mean=max(loss.mean, 0.0))
 
 
@@ -222,9 +221,9 @@ def _choice(measured: _Measured, chosen: _Trial) -> Choice:
     saved = sets.cost(sets.best) / sets.cost(chosen.rungs)
     at_best = chosen.rungs == sets.best
     sentence = (
-        "Train on the best rungs: nothing cheaper surely keeps the verdict."
+        "Train on the best rungs: nothing cheaper is certain to preserve the verdict."
         if at_best
-        else f"Train with {chosen.name}: {saved:.2g} times as cheap as the best rungs, and the "
+        else f"Train with {chosen.name}: cost {saved:.2g} times below that of the best rungs, the "
         f"error of the wear estimate rises by {percent(max(loss.mean, 0.0))} of the condemning "
         f"limit (standard error {percent(loss.standard_error)})."
     )
@@ -246,25 +245,25 @@ def _choice(measured: _Measured, chosen: _Trial) -> Choice:
     )
 
 
-def _here_sentence(here: _Trial, chosen: _Trial) -> str:
-    if here.loss.reason:
-        return f"The recipe as written has no figure: {here.loss.reason}."
-    if here is chosen:
-        return "That is how the recipe is written."
-    loss = here.loss.loss
+def _own_sentence(written: _Trial, chosen: _Trial) -> str:
+    if written.loss.reason:
+        return f"The recipe as written has no figure: {written.loss.reason}."
+    if written is chosen:
+        return "The recipe is written this way already."
+    loss = written.loss.loss
     return (
-        f"The recipe as written ({here.name}) costs {percent(max(loss.mean, 0.0))} of the limit "
+        f"The recipe as written ({written.name}) costs {percent(max(loss.mean, 0.0))} of the limit "
         f"(standard error {percent(loss.standard_error)})."
     )
 
 
 def _waveform_sentence(trials: Sequence[_Trial]) -> str:
-    """Which single rung moves the signal most, and what that is worth."""
-    told = [each for each in trials if not each.loss.reason and math.isfinite(each.level_change)]
-    most = max(told, key=lambda each: each.level_change, default=None)
+    """Rung with the largest effect on the signal, and its effect on the verdict."""
+    usable = [each for each in trials if not each.loss.reason and math.isfinite(each.level_change)]
+    most = max(usable, key=lambda each: each.level_change, default=None)
     if most is None or most.level_change == 0:
         return "No rung moves the levels of bands and orders."
     return (
-        f"The waveform moves most with {most.name}, by {most.level_change:.2g} dB in bands and "
-        f"orders; the verdict loses {percent(max(most.loss.loss.mean, 0.0))} by it."
+        f"The waveform changes most with {most.name}, by {most.level_change:.2g} dB in bands and "
+        f"orders; the verdict loses {percent(max(most.loss.loss.mean, 0.0))}."
     )

@@ -1,4 +1,4 @@
-"""Words of a scene's chart: rungs and numerics by their values, errors with their quantity."""
+"""Words of a scene's chart: rungs, numerics with their values, errors with their quantity."""
 
 import math
 from collections.abc import Mapping
@@ -9,8 +9,8 @@ from ...sim.fidelity.differences import Candidate
 from ...sim.fidelity.findings import Raise
 from ...sim.scene.scene import Scene
 
-HERE = "your scene as written"
-"""Name of the point where only what the user wrote is."""
+AS_WRITTEN = "your scene as written"
+"""Name of the point without changes."""
 
 EFFECTS = {
     "crankpin": "crank pin",
@@ -22,7 +22,7 @@ EFFECTS = {
     "film": "film",
     "beam": "beam",
 }
-"""Effect -> words; numerics speak by their values."""
+"""Effect -> words; numerics are named by their values."""
 
 
 def effect_words(effect: str) -> str:
@@ -48,7 +48,7 @@ def rung_words(
     values : mapping of str to object
         Dotted path -> value of the combination.
     before : mapping of str to object, optional
-        The same of the scene as written, for a mesh to be told by what of it changes.
+        The same paths in the scene as written, to show which numbers of a mesh change.
 
     Examples
     --------
@@ -76,13 +76,13 @@ _MESH = ("film.n_theta", "film.n_z")
 
 
 def _changed(path: str, values: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[Any, str]:
-    """A value, and how it was before; of no scene nothing."""
+    """A value, and its previous value in words; empty without one."""
     value, old = values[path], before.get(path)
     return value, "" if old is None else " (unchanged)" if old == value else f" (was {old})"
 
 
 def short_time(value: float) -> str:
-    """A time below a second, in the unit that suits it.
+    """A time below a second, in a suitable unit.
 
     Examples
     --------
@@ -98,7 +98,7 @@ _MILLI = 1e-3
 def combination_words(
     candidate: Candidate, written: Mapping[str, str], before: Mapping[str, Any] | None = None
 ) -> str:
-    """What a combination has other than the scene as written.
+    """Differences of a combination from the scene as written.
 
     Parameters
     ----------
@@ -106,19 +106,19 @@ def combination_words(
     written : mapping of str to str
         Effect -> rung of the scene as written.
     before : mapping of str to object, optional
-        As of :func:`rung_words`.
+        As in :func:`rung_words`.
 
     Returns
     -------
     str
-        :data:`HERE` where that is nothing.
+        :data:`AS_WRITTEN` if there are none.
     """
     parts = [
         rung_words(effect, rung, candidate.values, before)
         for effect, rung in candidate.rungs.items()
         if rung != written.get(effect)
     ]
-    return ", ".join(parts) or HERE
+    return ", ".join(parts) or AS_WRITTEN
 
 
 def percent(value: float) -> str:
@@ -142,7 +142,7 @@ _SMALLEST = 1e-4
 
 
 def two_digits(value: float) -> str:
-    """A share in per cent with its zeros.
+    """A share in per cent with two digits, trailing zeros included.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def error_words(candidate: Candidate, scene: Scene, error: str = "") -> str:
     candidate : Candidate
     scene : Scene
     error : str, optional
-        The error itself in other words.
+        Replacement for the error in words.
 
     Returns
     -------
@@ -178,20 +178,20 @@ def error_words(candidate: Candidate, scene: Scene, error: str = "") -> str:
 
 
 def with_scatter(error: float, standard_error: float, starts: int = 0) -> str:
-    """An error in per cent with what is known of its scatter.
+    """An error in per cent with its scatter, if known.
 
     Parameters
     ----------
     error, standard_error : float
-        [-]; the latter is told with one digit, as it is uncertain itself.
+        [-]; the latter is given with one digit, because it is uncertain itself.
     starts : int, optional
-        Two tell no standard error that may be shown.
+        Two starts give no standard error worth showing.
 
     Returns
     -------
     str
-        No standard error where starts do not scatter. One as large as the error itself gives the
-        error with a bound, two of them above it.
+        Without a standard error if starts do not scatter. If it is as large as the error itself,
+        the error is given with a bound two standard errors above it.
 
     Examples
     --------
@@ -211,11 +211,11 @@ def with_scatter(error: float, standard_error: float, starts: int = 0) -> str:
     return f"{percent(error).removesuffix(' %')} ± {float(f'{100 * standard_error:.1g}'):g} %"
 
 
-_FEWEST = 2  # starts that have a scatter at all
+_FEWEST = 2  # starts needed for a scatter
 
 
 def few_starts(error: float, starts: int) -> str:
-    """What stands behind an error that is a mean of two starts only.
+    """Remark on an error that is the mean of only two starts.
 
     Examples
     --------
@@ -226,7 +226,7 @@ def few_starts(error: float, starts: int) -> str:
 
 
 def raise_words(each: Raise, scene: Scene) -> str:
-    """What a rung of the scene as written costs, in one line.
+    """Error of a rung of the scene as written, in one line.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def raise_words(each: Raise, scene: Scene) -> str:
 
 
 def faster_words(seconds: float, own: float) -> str:
-    """How a time compares with that of the scene as written.
+    """A time compared with that of the scene as written, in words.
 
     Examples
     --------
@@ -277,7 +277,7 @@ def time_words(seconds: float) -> str:
 
 
 _MINUTE = 60.0
-_HOURS = 120.0  # min from which hours are told
+_HOURS = 120.0  # min from which hours are used
 
 
 def is_faster(seconds: float, own: float) -> bool:
@@ -291,4 +291,4 @@ def is_faster(seconds: float, own: float) -> bool:
     return own > _ALIKE * seconds
 
 
-_ALIKE = 1.15  # times of runs scatter by as much
+_ALIKE = 1.15  # scatter of run times
