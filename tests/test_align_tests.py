@@ -197,7 +197,7 @@ def test_reactions_that_no_sag_explains_are_said_to_be_so(rig, straight_reaction
     rows = [f"{name},{2 * load},3" for name, load in straight_reactions.items()]  # twice the weight
     table.write_text("\n".join(["bearing,reaction_n,error_n", *rows]), encoding="utf-8")
     report = sag_report(rig, reactions=table)
-    assert "does not explain what was measured" in sag_text(report)
+    assert "does not explain the measurements" in sag_text(report)
     assert "next:" not in sag_text(report)
 
 

@@ -123,7 +123,7 @@ def test_a_line_that_is_not_the_described_one_and_one_way_are_said(tmp_path):
     first, _ = read_curves(tmp_path / "jacks.csv", load_scene("shaft-rig", STRAIGHT))
     assert "must be" in first.text
     assert "by the line as described" in first.text
-    assert "lower it too" in first.text
+    assert "while lowering too" in first.text
 
 
 def test_align_takes_curves(tmp_path):

@@ -360,7 +360,7 @@ def test_the_summary_says_what_the_test_found(ship):
     )
     assert "In the model these peaks change by" in ship.summary
     empty = replace(ship, changes=())
-    assert empty.summary.startswith("No peak stands out")
+    assert empty.summary.startswith("No peak exceeds")
 
 
 def test_turns_go_into_the_scene():

@@ -1,4 +1,4 @@
-"""A shaft line tested before and after its calibration: table and text."""
+"""Test of a shaft line before and after its calibration: table and text."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,21 +18,21 @@ from .peak_changes import PeakChange, peak_changes
 from .rig_setup import TEST_KINDS, HammerTest, RigError, ShakerTest, free_time
 from .rig_test import Plant, RigTest, named_place, needed_time, rotor_plant, run_test
 
-_BLOW_SHARE, _SHAKER_SHARE, _CELL_SHARE = 0.2, 0.02, 5e-6  # of a shaft's weight: usual forces
+_BLOW_SHARE, _SHAKER_SHARE, _CELL_SHARE = 0.2, 0.02, 5e-6  # forces over shaft weight
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BeforeAfter:
-    """The same test before and after bearings were moved.
+    """One test before and after bearings were moved.
 
     Attributes
     ----------
     scene : str
-        Its name.
+        Name of the scene.
     moves : dict of str to float
-        Bearing -> by how much it was moved up [m].
+        Bearing -> upward move [m].
     force : place
-        Where the test force acted.
+        Place of the test force.
     before, after : RigTest
     changes : tuple of PeakChange
     """
@@ -45,7 +45,7 @@ class BeforeAfter:
     changes: tuple[PeakChange, ...]
 
     def of(self, verdict: str) -> tuple[PeakChange, ...]:
-        """Peaks that were ``suppressed``, ``amplified`` or left ``unchanged``."""
+        """Peaks with the verdict ``suppressed``, ``amplified`` or ``unchanged``."""
         return tuple(change for change in self.changes if change.verdict == verdict)
 
     @property
@@ -62,32 +62,32 @@ def scene_plant(
     sample_rate: float,
     direction: Literal["up", "side"] = "up",
 ) -> Plant:
-    """A scene's shaft in steady running, with an accelerometer on every housing.
+    """Shaft of a scene in steady running, with an accelerometer on every housing.
 
     Parameters
     ----------
     scene : ShaftScene
     moves : mapping of str to float, optional
-        Bearing -> by how much it is moved up [m].
+        Bearing -> upward move [m].
     force : place
-        Where the test force acts: ``(bearing or station, "y" or "z")``, on the shaft, or
-        ``(bearing, "y" or "z", "housing")``. A station must be a node of the beam: of a disc, a
+        Place of the test force: ``(bearing or station, "y" or "z")`` on the shaft, or
+        ``(bearing, "y" or "z", "housing")``. A station must be a node of the beam: at a disc, a
         load, a bearing or the coupling.
     sample_rate : float
-        Of the test [Hz].
+        Sample rate of the test [Hz].
     direction : str
-        Of the accelerometers, ``up`` or ``side``.
+        Direction of the accelerometers, ``up`` or ``side``.
 
     Returns
     -------
     Plant
-        With unbalance, blade rate, coupling and turbulence of the scene as its own vibration, and
-        the noise of its noisiest accelerometer on every channel.
+        Its own vibration comes from unbalance, blade rate, coupling and turbulence of the scene;
+        every channel has the noise of the noisiest accelerometer.
 
     Raises
     ------
     ShaftFilmError
-        Beam and films find no balance.
+        Beam and films have no equilibrium.
     RigError, ValueError
         A place or a move is unknown.
     """
@@ -106,13 +106,13 @@ def scene_plant(
 
 
 def turned_scene(scene: ShaftScene, turns: Mapping[str, float]) -> ShaftScene:
-    """A scene whose bearings have been turned, as by slope boring.
+    """Turn the bearings of a scene, as by slope boring.
 
     Parameters
     ----------
     scene : ShaftScene
     turns : mapping of str to float
-        Bearing -> by how much the slope dy/dx of its bore grows [rad].
+        Bearing -> increase of the slope dy/dx of its bore [rad].
 
     Returns
     -------
@@ -121,7 +121,7 @@ def turned_scene(scene: ShaftScene, turns: Mapping[str, float]) -> ShaftScene:
     Raises
     ------
     RigError
-        A turn names no bearing.
+        A turn names an unknown bearing.
 
     Examples
     --------
@@ -154,21 +154,21 @@ def before_after(
     setup: HammerTest | ShakerTest | None = None,
     seed: int = 0,
 ) -> BeforeAfter:
-    """Test a shaft before and after its bearings are moved, and follow the peaks.
+    """Test a shaft before and after its bearings are moved, and compare the peaks.
 
     Parameters
     ----------
     scene : ShaftScene
     moves : mapping of str to float
-        Bearing -> by how much it is moved up [m], as a load calibration proposes.
+        Bearing -> upward move [m], as a load calibration proposes.
     force : place
-        Where the test force acts, see `scene_plant`.
+        Place of the test force, see `scene_plant`.
     turns : mapping of str to float, optional
-        Bearing -> by how much its bore is turned [rad].
+        Bearing -> rotation of its bore [rad].
     setup : HammerTest or ShakerTest, optional
-        A hammer test as it stands by default.
+        By default ``HammerTest()``.
     seed : int
-        Of both tests, which are independent of each other.
+        Seed of both tests, which are independent of each other.
 
     Returns
     -------
@@ -177,11 +177,11 @@ def before_after(
     Raises
     ------
     ShaftFilmError, RigError
-        As `scene_plant`, `run_test`.
+        As in `scene_plant`, `run_test`.
 
     Notes
     -----
-    The claim put to the test: calibration of the bearing loads suppresses the transmission of
+    It tests the claim that calibration of the bearing loads suppresses the transmission of
     vibration at some peaks.
 
     References
@@ -234,24 +234,24 @@ def calibrated_test(
     Parameters
     ----------
     scene : Scene
-        Of the machine propulsion-shaft.
+        Scene of the machine propulsion-shaft.
     calibration : Calibration or None
-        Of :func:`wearstate.sim.alignment.calibration.calibrate`.
+        From :func:`wearstate.sim.alignment.calibration.calibrate`.
     kind : str
         Name of a kind in `TEST_KINDS`, with the setup of `usual_setup`.
     push : str, optional
-        Bearing whose journal is pushed up; the aftmost by default.
+        Bearing whose journal is pushed up; by default the aftmost one.
     seed : int
 
     Returns
     -------
     BeforeAfter or None
-        None where nothing moves.
+        None if nothing is moved.
 
     Raises
     ------
     ShaftFilmError, RigError
-        As `before_after`; the scene is no shaft line, or `push` is no bearing of it.
+        As in `before_after`; or the scene is not a shaft line, or `push` is not a bearing of it.
     """
     if not isinstance(scene, ShaftScene):
         raise RigError(
@@ -283,7 +283,7 @@ def usual_setup(
     *,
     force: Place,
 ) -> HammerTest | ShakerTest:
-    """A test of a size that goes with the shaft, its blocks long enough for every state.
+    """Test sized for the shaft, with blocks long enough for every state.
 
     Parameters
     ----------
@@ -297,13 +297,14 @@ def usual_setup(
     Returns
     -------
     HammerTest or ShakerTest
-        Peaks of a fifth of the shaft's weight, or a shaker's rms of a fiftieth; a force cell's
-        noise of 5e-6 of it. Blocks of 4 s, or of as many whole seconds as the responses need.
+        Peak force a fifth of the shaft's weight for a hammer, rms force a fiftieth for a shaker;
+        noise of the force cell 5e-6 of it. Blocks of 4 s, or as many whole seconds as the responses
+        need.
 
     Raises
     ------
     ShaftFilmError, RigError, ValueError
-        As `scene_plant`.
+        As in `scene_plant`.
 
     Examples
     --------
@@ -335,7 +336,7 @@ def usual_setup(
 def _summary(result: BeforeAfter) -> str:
     counted = len(result.changes)
     if not counted:
-        return "No peak stands out of the scatter: average more, push harder or run more quietly."
+        return "No peak exceeds the scatter: average more, push harder or run more quietly."
     fell, rose = result.of("suppressed"), result.of("amplified")
     texts = [
         f"Of {counted} peaks {len(fell)} fell and {len(rose)} rose significantly "
@@ -355,26 +356,26 @@ def _summary(result: BeforeAfter) -> str:
 
 
 def _power(changes: Sequence[PeakChange]) -> str:
-    """What such a test can show of the moves at all."""
+    """Sentence on which effects of the moves such a test can show."""
     scatter = [peak.scatter for peak in changes]
     shown = [peak for peak in changes if peak.expected]
-    told = (
+    scatters = (
         f"The change of a peak scatters by ±{min(scatter):.1f} to ±{max(scatter):.1f} dB in this "
         "test; in the model "
     )
     if not shown:
-        return f"{told}no peak changes by more, so the test cannot show what these moves do."
+        return f"{scatters}no peak changes by more, so the test cannot show what these moves do."
     most = max(shown, key=lambda peak: abs(peak.model_change) / peak.scatter)
-    one = len(shown) == 1
+    verb = "changes" if len(shown) == 1 else "change"
     return (
-        f"{told}{len(shown)} of {len(changes)} peaks {'changes' if one else 'change'} by more and "
-        f"may show it, first of all {most.channel} at "
+        f"{scatters}{len(shown)} of {len(changes)} peaks {verb} by more and "
+        f"may show it, above all {most.channel} at "
         f"{most.frequency_before:.1f} Hz ({most.model_change:+.1f} dB)."
     )
 
 
 def rig_table(result: BeforeAfter) -> dict[str, Any]:
-    """Everything a test before and after found, in SI and decibels, ready for JSON.
+    """Results of a test before and after, in SI and decibels, ready for JSON.
 
     Parameters
     ----------
@@ -401,7 +402,7 @@ def rig_table(result: BeforeAfter) -> dict[str, Any]:
 
 
 def rig_text(result: BeforeAfter) -> str:
-    """The same for a terminal.
+    """Results of a test before and after, for a terminal.
 
     Parameters
     ----------
@@ -410,7 +411,7 @@ def rig_text(result: BeforeAfter) -> str:
     Returns
     -------
     str
-        One line for each peak: where, its level before, and the change with its interval.
+        One line per peak: place, level before, and change with its interval.
     """
     kind = TEST_KINDS[type(result.before.setup)].name
     count, where = round(result.before.frf.averages), _in_words(result.force)

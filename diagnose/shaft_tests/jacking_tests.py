@@ -1,4 +1,4 @@
-"""Measured jacking curves of a shaft line: its reactions with errors, and a check of the line."""
+"""Measured jacking curves of a shaft line: reactions with errors, and a check of the line."""
 
 import csv
 import math
@@ -19,30 +19,30 @@ from .next_test import JACKING_ERROR
 from .sag_model import MeasuredReactions, SagError
 
 _BOTH_WAYS = 0.02
-"""Error of a reaction by a curve that goes up and down, over the reaction [-], beside its scatter:
-pressure gauge and piston area to 1 %, correction factor, friction that is not the same both ways
-(estimate)."""
+"""Error of a reaction from a curve of lifting and lowering, over the reaction and in addition to
+its scatter [-]: pressure gauge and piston area to 1 %, correction factor, friction that differs
+between both directions (estimate)."""
 
-_OTHER_SLOPE = 0.1  # of the model's: beyond it the line is not the one described
-_SURE = 3.0  # deviations of the slope
+_OTHER_SLOPE = 0.1  # of the model's slope: a larger deviation means that the line differs
+_SURE = 3.0  # standard deviations of the slope
 _UNITS = {"lift": (("m", 1.0), ("mm", 1e-3)), "load": (("n", 1.0), ("kn", 1e3))}
 
 
 @dataclass(frozen=True, kw_only=True)
 class JackedBearing:
-    """What one measured curve tells.
+    """Result of one measured curve.
 
     Attributes
     ----------
     bearing : str
     fit : CurveFit
     factor : float
-        Reaction over the load of the free line without lift, by the line as described [-].
+        Reaction over the load of the second straight part at zero lift, from the scene [-].
     reaction, deviation : float
         [N]
     influence, expected_influence : float
-        Own influence number of the bearing, fall of its reaction by its own lowering, as the
-        curve's slope tells it and as the line has it [N/m].
+        Own influence number of the bearing, i.e. decrease of its reaction per own lowering, from
+        the slope of the curve and from the scene [N/m].
     warnings : tuple of str
     """
 
@@ -57,17 +57,17 @@ class JackedBearing:
 
     @property
     def text(self) -> str:
-        """One line for people."""
-        told = (
+        """Result in one line."""
+        result = (
             f"jack beside {self.bearing}: reaction {1e-3 * self.reaction:.4g} ± "
             f"{1e-3 * self.deviation:.2g} kN, free at {1e3 * self.fit.free_lift:.3g} mm, own "
             f"influence number {1e-6 * self.influence:.4g} kN/mm (line: "
             f"{1e-6 * self.expected_influence:.4g})"
         )
-        return "; ".join([told, *self.warnings])
+        return "; ".join([result, *self.warnings])
 
     def as_dict(self) -> dict[str, Any]:
-        """In SI, for JSON."""
+        """Result in SI, for JSON."""
         return {
             "bearing": self.bearing,
             "reaction_n": self.reaction,
@@ -83,17 +83,17 @@ class JackedBearing:
 def read_curves(
     path: str | Path, scene: ShaftScene, *, condition: str = "cold"
 ) -> tuple[JackedBearing, ...]:
-    """Reactions by measured jacking curves, from a table.
+    """Read measured jacking curves from a table and evaluate the reactions.
 
     Parameters
     ----------
     path : str or Path
-        CSV, a row for each reading in its order: ``bearing``, ``lift_mm`` or ``lift_m``,
-        ``load_kn`` or ``load_n``; ``station_m`` of the jack, where it is not beside the bearing.
+        CSV, one row per reading in order: ``bearing``, ``lift_mm`` or ``lift_m``, ``load_kn`` or
+        ``load_n``; ``station_m`` of the jack if it is not next to the bearing.
     scene : ShaftScene
-        As it was aligned: its shaft tells the correction factor.
+        The line as aligned; its shaft determines the correction factor.
     condition : str
-        Of the scene in which they were measured.
+        Condition of the scene during the measurement.
 
     Returns
     -------
@@ -103,10 +103,10 @@ def read_curves(
     Raises
     ------
     DataError
-        The file cannot be read, a column, number or bearing is not as it must be, or a curve shows
-        no bearing that comes free; all faults at once.
+        The file cannot be read, a column, number or bearing is invalid, or a curve does not show
+        the bearing coming free; all faults at once.
     SagError
-        There is no such condition.
+        The condition is unknown.
     """
     curves = _curves(Path(path), [bearing.name for bearing in scene.bearings])
     faults, found = [], []
@@ -121,7 +121,7 @@ def read_curves(
 
 
 def measured_curves(found: tuple[JackedBearing, ...], condition: str) -> MeasuredReactions:
-    """The curves as reactions for the posterior of sags."""
+    """Reactions from the curves, as input of the posterior of sags."""
     return MeasuredReactions(
         reactions={one.bearing: one.reaction for one in found},
         deviations={one.bearing: one.deviation for one in found},
@@ -168,7 +168,7 @@ def _warnings(fit: CurveFit, model: Jacking) -> list[str]:
             "or whether another bearing lifted"
         )
     if fit.friction is None:
-        found.append("read lifting only: lower it too, to take friction out")
+        found.append("read while lifting only: read while lowering too, to eliminate friction")
     return found
 
 
@@ -176,7 +176,7 @@ def _warnings(fit: CurveFit, model: Jacking) -> list[str]:
 
 
 def _curves(path: Path, names: list[str]) -> dict[str, list[tuple[float, float, float]]]:
-    """Lift [m], load [N] and station [m] (NaN: beside the bearing) of each reading."""
+    """Lift [m], load [N] and station [m] (NaN: next to the bearing) of each reading."""
     try:
         rows = list(csv.DictReader(path.read_text(encoding="utf-8-sig").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:

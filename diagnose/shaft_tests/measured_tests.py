@@ -20,10 +20,10 @@ from .next_test import JACKING_ERROR
 from .sag_model import MeasuredReactions, MeasuredTransfer
 
 _BLOCKS = 10  # whole windows in a record, overlapped by half
-_FINEST_HZ = 0.25  # between lines: finer ones are no better for oil-damped shafts
-_MOST_LINES = 200  # evenly taken, of the band
-_FLOOR = 0.01  # of a transfer function: leakage and calibration
-_FEWEST_HEARD = 0.05  # of the lines of the band: mere noise makes some of a hundredth of them
+_FINEST_HZ = 0.25  # spacing of lines: oil-damped shafts need no finer one
+_MOST_LINES = 200  # evenly spaced in the band
+_FLOOR = 0.01  # error of a transfer function, relative: leakage and calibration
+_FEWEST_HEARD = 0.05  # of the lines of the band: noise alone yields about a hundredth of them
 _LOW_HZ = 5.0
 _HIGH_HZ = 400.0
 _HIGH_SHARE = 0.4  # of the sample rate
@@ -37,9 +37,9 @@ class LineTest:
     ----------
     transfer : MeasuredTransfer
     coherence : ndarray, shape (n_lines, n_resp)
-        At the lines of `transfer` [-].
+        Coherence at the lines of `transfer` [-].
     text : str
-        Where it pushes, how it was averaged, how coherent it is.
+        Place of the force, averaging and coherence.
     """
 
     transfer: MeasuredTransfer
@@ -48,14 +48,14 @@ class LineTest:
 
 
 def read_tests(path: str | Path, scene: ShaftScene) -> tuple[LineTest, ...]:
-    """Tests of one line from a data set or recording of this program.
+    """Read the tests of one line from a data set or recording of this program.
 
     Parameters
     ----------
     path : str or Path
-        Every record is a test of the same line; `import` makes such a file of measured ones.
+        Every record is a test of the same line; `import` converts measured files.
     scene : ShaftScene
-        Whose sensors and exciters name the channels that do not say where they are.
+        Its sensors and exciters locate channels without a stated place.
 
     Returns
     -------
@@ -65,14 +65,14 @@ def read_tests(path: str | Path, scene: ShaftScene) -> tuple[LineTest, ...]:
     Raises
     ------
     DataError
-        The file cannot be read, holds several machines, or a channel, its place or the speed is
+        The file cannot be read or holds several machines, or a channel, its place or the speed is
         missing.
     """
     data = DataSet(path)
     machines = {name for name in data.machines if name}
     if len(machines) > 1:
         raise DataError(
-            f"{path}: machines = {len(machines)} must be 1, the line that is to be aligned; "
+            f"{path}: machines = {len(machines)} must be 1, the line to be aligned; "
             "keep the records of one machine"
         )
     return tuple(test for number in range(len(data)) for test in line_tests(data[number], scene))
@@ -84,9 +84,9 @@ def line_tests(recording: Recording, scene: ShaftScene) -> tuple[LineTest, ...]:
     Parameters
     ----------
     recording : Recording
-        With force and acceleration channels; a tacho, or a speed in its manifest.
+        Recording with force and acceleration channels, and a tacho or a speed in its manifest.
     scene
-        As of :func:`read_tests`.
+        As in :func:`read_tests`.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def line_tests(recording: Recording, scene: ShaftScene) -> tuple[LineTest, ...]:
     Raises
     ------
     DataError
-        As of :func:`read_tests`.
+        As in :func:`read_tests`.
     """
     forces = [c for c in recording.channels if c.quantity == "force"]
     seen = [c for c in recording.channels if c.quantity == "acceleration"]
@@ -111,8 +111,8 @@ def line_tests(recording: Recording, scene: ShaftScene) -> tuple[LineTest, ...]:
     found = measured_transfer(rows[0], rows[1], fs, nperseg=_window(recording), band=(_LOW_HZ, top))
     if found.decay or np.isnan(found.coherence).any():
         raise DataError(
-            f"{recording.source}: blows = 1 must be >= 2 for a coherence, by which a test is "
-            "believed; strike several times"
+            f"{recording.source}: blows = 1 must be >= 2 for a coherence, without which a test is "
+            "not trusted; strike several times"
         )
     speed = math.tau * _speed(recording)
     shape = (len(seen), len(forces), -1)
@@ -147,7 +147,7 @@ def _window(recording: Recording) -> int:
 
 
 def _kept(heard: NDArray[np.bool_], source: str, name: str) -> NDArray[np.intp]:
-    """Lines that all responses hear, at most so many."""
+    """Lines at which all responses are coherent with the force, up to a largest number."""
     usable = np.flatnonzero(heard)
     if usable.size < _FEWEST_HEARD * heard.size:
         raise DataError(
@@ -162,7 +162,7 @@ def _kept(heard: NDArray[np.bool_], source: str, name: str) -> NDArray[np.intp]:
 def _covariance(
     value: NDArray[np.complex128], noise: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
-    """Errors of the responses taken as independent (n_lines, n_resp, n_resp)."""
+    """Covariance of independent errors of the responses (n_lines, n_resp, n_resp)."""
     variance = noise + (_FLOOR * np.abs(value)) ** 2
     return np.asarray(
         np.einsum("lr,rs->lrs", variance, np.eye(value.shape[1])), dtype=np.complex128
@@ -170,7 +170,7 @@ def _covariance(
 
 
 def _speed(recording: Recording) -> float:
-    """Mean speed by the tacho, else as declared [Hz]."""
+    """Mean speed from the tacho, else as declared [Hz]."""
     tacho = recording.tacho_signal
     if tacho is not None:
         pulses = pulse_times(tacho, recording.sample_rate)
@@ -190,7 +190,7 @@ def _speed(recording: Recording) -> float:
 
 
 def _place(channel: Channel, scene: ShaftScene) -> Place:
-    """By its metadata, else by its name among the scene's sensors and exciters."""
+    """Place of a channel from its metadata, else from the scene's sensor or exciter of its name."""
     stated, axis = _stated(channel.place), _axis(channel.direction)
     if stated is not None and axis is not None:
         return _on_line(*stated, axis, scene)
@@ -210,7 +210,7 @@ def _place(channel: Channel, scene: ShaftScene) -> Place:
 
 
 def _on_line(where: str, housing: bool, axis: str, scene: ShaftScene) -> Place:
-    """A place of the line, discs and numbers as stations."""
+    """Place on the line; discs and numbers are converted to stations."""
     if where in [bearing.name for bearing in scene.bearings]:
         return (where, axis, "housing") if housing else (where, axis)
     stations = {disc.name: disc.station for disc in scene.discs}
@@ -234,7 +234,7 @@ def _axis(direction: str) -> str | None:
 
 
 def _stated(place: str) -> tuple[str, bool] | None:
-    """Name and whether it is a housing."""
+    """Name, and whether it is a housing."""
     match = re.fullmatch(r"(housing of|shaft at) (.+)", place.strip())
     return None if match is None else (match.group(2), match.group(1) == "housing of")
 
@@ -245,17 +245,17 @@ def _stated(place: str) -> tuple[str, bool] | None:
 def read_reactions(
     path: str | Path, scene: ShaftScene, *, condition: str = "cold"
 ) -> MeasuredReactions:
-    r"""Measured reactions from a table.
+    r"""Read measured reactions from a table.
 
     Parameters
     ----------
     path : str or Path
         CSV with the columns ``bearing``, ``reaction_n`` or ``reaction_kn``, and ``error_n`` or
-        ``error_kn``, a standard deviation; without the last it is 5 % of the reaction, and of a
-        tenth of their mean at the least.
+        ``error_kn``, a standard deviation; by default 5 % of the reaction, but at least 5 % of a
+        tenth of the mean reaction.
     scene : ShaftScene
     condition : str
-        Of the scene in which they were measured.
+        Condition of the scene during the measurement.
 
     Returns
     -------
@@ -264,8 +264,7 @@ def read_reactions(
     Raises
     ------
     DataError
-        The file cannot be read, or a column, a number or a bearing is not as it must be; all
-        faults at once.
+        The file cannot be read, or a column, number or bearing is invalid; all faults at once.
 
     Examples
     --------
@@ -318,7 +317,7 @@ _FORCES = ("reaction", "error")
 
 
 def _newton(row: dict[str, str], key: str, where: str, faults: list[str]) -> float | None:
-    """A force of a row in N, from its column in N or kN; None where it is empty."""
+    """Force of a row [N], from its column in N or kN; None if empty."""
     for unit, factor in (("n", 1.0), ("kn", 1e3)):
         text = (row.get(f"{key}_{unit}") or "").strip()
         if not text:

@@ -1,8 +1,8 @@
-"""Which test of a shaft line to do next: where, which way and how hard to push, or what to jack.
+"""The next test of a shaft line: place, direction and size of the force, or the bearing to jack.
 
-A test is worth by how much it narrows the sags. Its slopes by every unknown at the most probable
-line and its noise, which the scene's own vibration and sensors make, give what would be left of
-the covariance; nothing has to be measured for that.
+The value of a test is the reduction of the variance of the sags. The remaining covariance follows
+from the derivatives with respect to every unknown at the most probable line and from the noise of
+the scene's own vibration and sensors; no measurement is needed.
 
 References
 ----------
@@ -50,34 +50,34 @@ Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MOST_MOTION = 0.1
-"""Rms motion of a journal in its bore under a test force, over the least film [-]: films stay
-linear to some per cent, and the peaks of a random force at a third of the film."""
+"""Rms motion of a journal in its bore under a test force, over the smallest film thickness [-]:
+films stay linear within a few per cent, and peaks of a random force at a third of the film."""
 
 JACKING_ERROR = 0.05
-"""Usual error of a reaction by jacking, over the reaction [-]: friction of jack and shaft; from
-memory of class guidance, which speaks of 5 to 10 per cent."""
+"""Usual error of a reaction from jacking, over the reaction [-]: friction of jack and shaft; from
+memory of class guidance, which states 5 to 10 per cent."""
 
-_LINES = 60  # of a test that is planned: its place is told apart by far fewer
-_SHAKER_SHARE = 0.02  # of the shaft's weight: a usual shaker's rms
-_FLOOR = 1e-3  # of a transfer function: nothing is measured better
+_LINES = 60  # of a planned test: far fewer distinguish the places
+_SHAKER_SHARE = 0.02  # rms of a usual shaker, over the shaft's weight
+_FLOOR = 1e-3  # smallest relative error of a measured transfer function
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest:
-    """A test that could be done, and what it would leave.
+    """A possible test, and the uncertainty that it would leave.
 
     Attributes
     ----------
     push : place or None
-        Where the force acts; None of a jack.
+        Place of the force; None for a jack.
     jack : str
-        Bearing to be jacked, or nothing.
+        Bearing to be jacked, or empty.
     force : float
         Rms of a shaker, peak of a hammer [N]; error of a jack's reaction [N].
     deviations : tuple of float
-        Of each sag after the test [m], in the order of the posterior.
+        Standard deviation of each sag after the test [m], in the order of the posterior.
     gain : float
-        Share of the sum of the sags' variances that the test takes away [-].
+        Relative reduction of the sum of the sags' variances by the test [-].
     """
 
     push: Place | None
@@ -88,7 +88,7 @@ class PlannedTest:
 
     @property
     def text(self) -> str:
-        """What to do, in words."""
+        """The test in words."""
         if self.push is None:
             return f"jack {self.jack}"
         assert isinstance(self.push, tuple)
@@ -100,7 +100,7 @@ class PlannedTest:
 
 
 def candidate_places(scene: ShaftScene) -> tuple[Place, ...]:
-    """Where a line can be pushed: shaft and housing at every bearing, shaft at its discs.
+    """Places where a line can be pushed: shaft and housing at every bearing, shaft at its discs.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def candidate_places(scene: ShaftScene) -> tuple[Place, ...]:
     Returns
     -------
     tuple of place
-        Each up and sideways.
+        Each vertical and horizontal.
 
     Examples
     --------
@@ -145,20 +145,20 @@ def usual_responses(scene: ShaftScene) -> tuple[Place, ...]:
 
 
 def force_density(setup: HammerTest | ShakerTest, frequencies: Vector) -> Vector:
-    """Mean power spectral density of a test's force over its blocks.
+    """Mean power spectral density of a test force over its blocks.
 
     Parameters
     ----------
     setup : HammerTest or ShakerTest
     frequencies : numpy.ndarray [shape=(n,)]
-        Inside the band [Hz].
+        Frequencies inside the band [Hz].
 
     Returns
     -------
     numpy.ndarray [shape=(n,)]
-        One-sided [N^2/Hz]. A burst of rms F has ``F^2 share / (1.05 high - 0.8 low)``, the band
-        that :mod:`.shaft_tests.rig_test` gives it; a half-sine of peak P
-        and length T one of ``2 |2 P T / pi cos(pi f T) / (1 - (2 f T)^2)|^2 / block``.
+        One-sided [N^2/Hz]. A burst of rms F has ``F^2 share / (1.05 high - 0.8 low)``, with the
+        band that :mod:`.shaft_tests.rig_test` gives it; a half-sine of peak P
+        and length T has ``2 |2 P T / pi cos(pi f T) / (1 - (2 f T)^2)|^2 / block``.
 
     Examples
     --------
@@ -187,20 +187,20 @@ def running_noise(
     *,
     sample_rate: float,
 ) -> Complex:
-    """Cross-spectral densities of what accelerometers read without a test force, orders left out.
+    """Cross-spectral densities of accelerometers without test force, shaft orders removed.
 
     Parameters
     ----------
     scene : ShaftScene
-        With its turbulence and sensors.
+        Supplies turbulence and sensors.
     model : LineModel
     film : BeamFilm
-        Its balance.
+        Equilibrium of the line.
     frequencies : numpy.ndarray [shape=(n_lines,)]
         [Hz]
     responses : sequence of place
     sample_rate : float
-        Over half of which the sensors' noise is spread [Hz].
+        The sensors' noise is spread over half of it [Hz].
 
     Returns
     -------
@@ -240,15 +240,15 @@ def running_noise(
 def transfer_covariance(
     setup: HammerTest | ShakerTest, noise: Complex, value: Complex, frequencies: Vector
 ) -> Complex:
-    """Covariance of H1 from such a test.
+    """Covariance of the H1 estimate of a test.
 
     Parameters
     ----------
     setup : HammerTest or ShakerTest
     noise : numpy.ndarray [shape=(n_lines, n_resp, n_resp)]
-        Of :func:`running_noise`.
+        From :func:`running_noise`.
     value : numpy.ndarray [shape=(n_lines, n_resp)]
-        Accelerance [(m/s^2)/N]; nothing is known better than to a thousandth of it.
+        Accelerance [(m/s^2)/N]; its relative error is at least a thousandth.
     frequencies : numpy.ndarray [shape=(n_lines,)]
         [Hz]
 
@@ -269,28 +269,28 @@ def transfer_covariance(
     return np.asarray(noise / power[:, None, None] + floor)
 
 
-# --- how hard
+# --- size of the force
 
 
 def fitting_force(
     model: LineModel, film: BeamFilm, line: FreeLine, setup: HammerTest | ShakerTest
 ) -> HammerTest | ShakerTest:
-    """The test with its force lowered until the films stay linear.
+    """Reduce the force of a test until the films stay linear.
 
     Parameters
     ----------
     model : LineModel
     film : BeamFilm
     line : FreeLine
-        With the one force of the test.
+        Condensed line with the one force of the test.
     setup : HammerTest or ShakerTest
-        With the most force that there is.
+        Test with the largest available force.
 
     Returns
     -------
     HammerTest or ShakerTest
-        A shaker moves no journal by more than :data:`MOST_MOTION` of its least film, rms; a hammer,
-        whose blow is short, by three times that at its peak.
+        A shaker moves no journal by more than :data:`MOST_MOTION` of its smallest film thickness,
+        rms; a hammer, whose blow is short, by no more than three times that at its peak.
 
     Examples
     --------
@@ -306,7 +306,7 @@ def fitting_force(
     if isinstance(setup, ShakerTest):
         most = float(np.max(np.sqrt(np.mean(motion**2, axis=0)) * setup.force / film.least_film))
         return replace(setup, force=setup.force * min(1.0, MOST_MOTION / most))
-    # a short blow: x(0+) at most the integral of its spectrum over the band, twice for both sides
+    # a short blow: x(0+) is at most the integral of its two-sided spectrum over the band
     impulse = 2 * setup.peak_force * setup.contact_time / math.pi
     width = 2 * (setup.high - setup.low)
     most = float(np.max(np.mean(motion, axis=0) * impulse * width / film.least_film))
@@ -314,14 +314,14 @@ def fitting_force(
 
 
 def _bore_motion(model: LineModel, film: BeamFilm, line: FreeLine) -> Complex:
-    """Journals less housings over the force (n_lines, n, 2)."""
+    """Motion of journals relative to housings, per unit force (n_lines, n, 2)."""
     found = transfer(model, film, line).right[..., 0]
     n, m = len(model.bearings), line.stiffness.shape[1]
     journals = found[:, : 4 * n].reshape(-1, n, 4)[..., :2]
     return np.asarray(journals - found[:, m:].reshape(-1, n, 2))
 
 
-# --- what to do
+# --- ranking
 
 
 def rank_tests(
@@ -335,26 +335,27 @@ def rank_tests(
     jacks: Sequence[str] = (),
     condition: str = "cold",
 ) -> tuple[PlannedTest, ...]:
-    """Tests of a line, the most telling first.
+    """Rank tests of a line, the most informative first.
 
     Parameters
     ----------
     scene : ShaftScene
-        The line as it was aligned.
+        The line as aligned.
     known : SagPosterior, optional
-        What earlier tests gave; by default nothing was tested.
+        Result of earlier tests; by default there are none.
     prior : Prior, optional
-        The one with which it was estimated.
+        Prior used for `known`.
     setup : HammerTest or ShakerTest, optional
-        With the most force that there is; by default a shaker of a fiftieth of the shaft's weight.
+        Test with the largest available force; by default a shaker with a fiftieth of the shaft's
+        weight.
     places : sequence of place, optional
-        Where to push; by default :func:`candidate_places`.
+        Places to push; by default :func:`candidate_places`.
     responses : sequence of place, optional
         By default the scene's accelerometers.
     jacks : sequence of str
         Bearings that can be jacked.
     condition : str
-        In which they would be.
+        Condition in which they would be jacked.
 
     Returns
     -------
@@ -363,7 +364,7 @@ def rank_tests(
     Raises
     ------
     SagError
-        There is nowhere to push and nothing to jack, or the prior has other unknowns than
+        There are no places to push and no bearings to jack, or the prior has other unknowns than
         `known`.
     ShaftFilmError
         The line does not rest on its films.
@@ -398,15 +399,15 @@ def _usual_force(scene: ShaftScene) -> float:
 def _state_of_knowledge(
     scene: ShaftScene, known: SagPosterior | None, prior: Prior
 ) -> tuple[Vector, Vector]:
-    """Precision of all unknowns but gains, and where they are."""
+    """Precision of all unknowns except gains, and their most probable values."""
     deviations = unknowns_of(scene, prior).deviations
     if known is None:
         return np.diag(deviations**-2.0), np.zeros(deviations.size)
     count = deviations.size
     if known.values.size < count:
         raise SagError(
-            f"prior has {count} unknowns, known has {known.values.size}; must be the prior with "
-            "which it was estimated"
+            f"prior has {count} unknowns, known has {known.values.size}; it must be the prior with "
+            "which known was estimated"
         )
     precision = np.asarray(np.linalg.inv(known.spread[:count, :count]), dtype=float)
     return precision, known.values[:count]
@@ -439,22 +440,22 @@ def _pushes(
         value = found.value[..., k]
         factor = np.linalg.cholesky(transfer_covariance(test, noise, value, hertz) / 2)
         white = np.asarray(np.linalg.inv(factor), dtype=np.complex128)
-        told = _information(white, slopes[..., k], value, prior.gain)
+        added = _information(white, slopes[..., k], value, prior.gain)
         force = test.peak_force if isinstance(test, HammerTest) else test.force
-        planned.append(_planned(now, told, question.unknowns.sags, push=place, force=force))
+        planned.append(_planned(now, added, question.unknowns.sags, push=place, force=force))
     return planned
 
 
 def _information(white: Complex, slopes: Complex, value: Complex, gain: float) -> Vector:
-    """Precision that a test adds, its gains taken out (p, p)."""
+    """Precision that a test adds, with its gains marginalised (p, p)."""
     rows = _real(np.einsum("lab,plb->pla", white, slopes))
-    told: Vector = rows @ rows.T
+    added: Vector = rows @ rows.T
     if gain > 0:
         single = np.einsum("lr,rk->klr", value, np.eye(value.shape[1]))
         own = _real(np.einsum("lab,plb->pla", white, single))
         across = rows @ own.T
-        told = told - across @ np.linalg.solve(own @ own.T + np.eye(len(own)) / gain**2, across.T)
-    return told
+        added = added - across @ np.linalg.solve(own @ own.T + np.eye(len(own)) / gain**2, across.T)
+    return added
 
 
 def _real(values: Complex) -> Vector:
@@ -464,14 +465,14 @@ def _real(values: Complex) -> Vector:
 
 def _planned(
     now: Vector,
-    told: Vector,
+    added: Vector,
     sags: slice,
     *,
     force: float,
     push: Place | None = None,
     jack: str = "",
 ) -> PlannedTest:
-    before, after = (np.diag(np.linalg.inv(precision))[sags] for precision in (now, now + told))
+    before, after = (np.diag(np.linalg.inv(precision))[sags] for precision in (now, now + added))
     return PlannedTest(
         push=push,
         jack=jack,
@@ -492,13 +493,13 @@ def _jacked(
         prior,
     )
     trial = trial_at(question, values, {})
-    assert trial is not None  # no film takes part
+    assert trial is not None  # no film is involved
     rows = slopes_at(question, trial)
     return _planned(now, rows.T @ rows, question.unknowns.sags, jack=name, force=load)
 
 
 def _reaction(scene: ShaftScene, values: Vector, prior: Prior, name: str, condition: str) -> float:
-    """Error of a jack's reaction, of a tenth of the mean load at the least [N]."""
+    """Error of a reaction from jacking [N], at least that of a tenth of the mean load."""
     question = question_of(scene, (), None, prior)
     moves = part_of(question.unknowns.change(values), "bore")[:, 0]
     line = alignment_line(scene).moved(moves)

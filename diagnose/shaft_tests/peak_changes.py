@@ -1,4 +1,4 @@
-"""Peaks of transfer functions before and after: which of them have moved, and how surely."""
+"""Peaks of transfer functions before and after: significant changes of their levels."""
 
 import math
 from collections.abc import Sequence
@@ -17,17 +17,17 @@ from .rig_test import RigTest
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_SEARCH_SHARE = 0.1  # of a peak's frequency, by which alignment may shift it
-_DEVIATIONS = 8.0  # by which a peak must stand out: of some hundred values the extremes are 6 apart
+_SEARCH_SHARE = 0.1  # largest shift of a peak by alignment, relative to its frequency
+_DEVIATIONS = 8.0  # height of a peak: the range of some hundred values is 6 deviations
 _SMOOTHED = 5  # lines averaged to find a peak
-_CHANCE = 1e-6  # of a peak's coherence without any connection
+_CHANCE = 1e-6  # probability of a peak's coherence if force and response are unrelated
 
 PROMINENCE_DB = 3.0  # a factor of two in power
 
 
 @dataclass(frozen=True, kw_only=True)
 class PeakChange:
-    """What became of one peak of one channel.
+    """Change of one peak of one channel.
 
     Attributes
     ----------
@@ -37,17 +37,17 @@ class PeakChange:
     level_before, level_after : float
         [dB re 1 (m/s^2)/N]
     change : float
-        Measured, after less before [dB].
+        Measured level after minus before [dB].
     interval : tuple of float
-        Confidence interval of the change, of this peak alone [dB].
+        Confidence interval of the change, for this peak alone [dB].
     p_value : float
-        Of no change, adjusted for the number of peaks (Holm) [-].
+        P-value of no change, adjusted for the number of peaks (Holm) [-].
     coherence_before, coherence_after : float
-        At the peak [-].
+        Coherence at the peak [-].
     model_change : float
-        What the change is in truth, the model's peak at both times [dB].
+        True change, from the peaks of the model before and after [dB].
     verdict : str
-        ``suppressed`` or ``amplified`` where the change is significant, else ``unchanged``.
+        ``suppressed`` or ``amplified`` if the change is significant, else ``unchanged``.
     """
 
     channel: str
@@ -70,18 +70,18 @@ class PeakChange:
 
     @property
     def expected(self) -> bool:
-        """Whether the true change is larger than the scatter: about every second test shows it."""
+        """Whether the true change exceeds the scatter: about half of all tests then show it."""
         return abs(self.model_change) > self.scatter
 
 
 def find_frf_peaks(frf: Frf, *, prominence: float = PROMINENCE_DB) -> tuple[NDArray[np.intp], ...]:
-    """Peaks of the magnitude that stand out of their surroundings and of their scatter.
+    """Peaks of the magnitude that exceed their surroundings and their scatter.
 
     Parameters
     ----------
     frf : Frf
     prominence : float
-        Least height over the higher of the two valleys beside it, > 0 [dB].
+        Smallest height over the higher of the two adjacent valleys, > 0 [dB].
 
     Returns
     -------
@@ -90,9 +90,9 @@ def find_frf_peaks(frf: Frf, *, prominence: float = PROMINENCE_DB) -> tuple[NDAr
 
     Notes
     -----
-    Sought in the mean power of five neighbouring lines. The peak must rise over the valleys by
-    eight standard deviations of that mean too, and its coherence must be significant (1e-6), else
-    noise would make peaks. Two resonances closer than five lines are one peak.
+    Peaks are searched in the mean power of five adjacent lines. To exclude peaks of noise, a peak
+    must also exceed the valleys by eight standard deviations of that mean, and its coherence must
+    be significant (1e-6). Two resonances closer than five lines count as one peak.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def find_frf_peaks(frf: Frf, *, prominence: float = PROMINENCE_DB) -> tuple[NDAr
 
 
 def _finite(deviation: Float) -> Float:
-    """Infinite where nothing hangs together: more than any peak stands out."""
+    """Replace an infinite deviation, of lines without coherence, by more than any peak's height."""
     return np.minimum(deviation, 1e3)
 
 
@@ -122,20 +122,20 @@ def _channel_peaks(
     smooth = 10 * np.log10(uniform_filter1d(np.abs(value) ** 2, _SMOOTHED) + TINY)
     lines, found = find_peaks(smooth, prominence=prominence)
     outstanding = found["prominences"] > _DEVIATIONS * deviation[lines] / math.sqrt(_SMOOTHED)
-    # without any connection P(coherence > c) = (1 - c)^(n - 1)
+    # for unrelated signals P(coherence > c) = (1 - c)^(n - 1)
     connected = coherence[lines] > 1 - _CHANCE ** (1 / (averages - 1))
     tops = [_top(np.abs(value), int(line)) for line in lines[outstanding & connected]]
     return np.unique(np.asarray(tops, dtype=np.intp))
 
 
 def _top(size: Float, line: int) -> int:
-    """Highest line of those that were smoothed into one."""
+    """Highest of the lines that were averaged into one."""
     first = max(0, line - _SMOOTHED // 2)
     return first + int(np.argmax(size[first : line + _SMOOTHED // 2 + 1]))
 
 
 def level_db(value: Complex | Float) -> Float:
-    """In decibels, floored by the smallest number."""
+    """Level in decibels; zero is replaced by a tiny number."""
     return np.asarray(20 * np.log10(np.abs(value) + TINY))
 
 
@@ -146,37 +146,37 @@ def peak_changes(
     prominence: float = PROMINENCE_DB,
     confidence: float = 0.95,
 ) -> tuple[PeakChange, ...]:
-    """Follow every peak of the first test into the second, and those of the second back.
+    """Match every peak of the first test with the second, and vice versa.
 
     Parameters
     ----------
     before, after : RigTest
-        Of the same channels and lines.
+        Tests with the same channels and lines.
     prominence : float
         As in `find_frf_peaks` [dB].
     confidence : float
-        Of the intervals; a verdict has the level ``1 - confidence`` over all peaks together [-].
+        Confidence of the intervals; verdicts have the level ``1 - confidence`` jointly [-].
 
     Returns
     -------
     tuple of PeakChange
-        By channel, then frequency.
+        Sorted by channel, then frequency.
 
     Raises
     ------
     RigError
-        The two tests have other lines or channels.
+        The two tests differ in lines or channels.
 
     Notes
     -----
-    A peak is found again in the nearest one of the second test, each taken once, whose frequency
-    differs by a tenth at most; there a third of the prominence is enough. Where there is none the
-    peak has gone, and the level of its line is taken; likewise a peak that has come, else the
-    choice of peaks would favour those that fall. Frequencies alone make the pairs: where alignment
-    shifts resonances past one another, the picture tells more than the table.
+    A peak is matched with the nearest one of the second test, each used once, whose frequency
+    differs by at most a tenth; there a third of the prominence is enough. Without a match the peak
+    has disappeared, and the level at its line is used. New peaks are treated in the same way,
+    otherwise the selection would favour peaks that fall. Matching uses frequencies alone: if
+    alignment shifts resonances past one another, the picture is clearer than the table.
 
     The scatter of a level in dB is normal to first order; the difference of two has Welch's
-    degrees of freedom. That the top of a noisy peak was picked raises both levels alike.
+    degrees of freedom. Picking the maximum of a noisy peak raises both levels alike.
 
     References
     ----------
@@ -190,9 +190,9 @@ def peak_changes(
     others = find_frf_peaks(after.frf, prominence=prominence / 3)
     new = find_frf_peaks(after.frf, prominence=prominence)
     found = [
-        _compared(before, after, channel, line, there, confidence)
+        _compared(before, after, channel, line, later, confidence)
         for channel, rows in enumerate(zip(tops, others, new, strict=True))
-        for line, there in _pairs(before.frf.frequency, *rows)
+        for line, later in _pairs(before.frf.frequency, *rows)
     ]
     adjusted = holm([p_value for _, p_value in found])
     return tuple(
@@ -216,7 +216,7 @@ def _pairs(
     later: NDArray[np.intp],
     new: NDArray[np.intp],
 ) -> list[tuple[int, int]]:
-    """Line before and line after of each peak; the same one where it has gone or come."""
+    """Lines before and after of each peak; the same line if it has disappeared or is new."""
     partner: dict[int, int] = {}
     free = {int(line) for line in later}
     near = sorted(
@@ -234,15 +234,15 @@ def _pairs(
 
 
 def _compared(
-    before: RigTest, after: RigTest, channel: int, line: int, there: int, confidence: float
+    before: RigTest, after: RigTest, channel: int, line: int, later: int, confidence: float
 ) -> tuple[PeakChange, float]:
-    """One peak and the p-value of it alone."""
-    sides = (before, line), (after, there)
+    """Change of one peak, and its unadjusted p-value."""
+    sides = (before, line), (after, later)
     levels = [float(level_db(test.frf.value[channel, at])) for test, at in sides]
     errors = [float(level_deviation(test.frf)[channel, at]) for test, at in sides]
     sizes = [np.abs(test.model[channel]) for test, _ in sides]
     truths = [
-        float(level_db(size[_top(size, at)])) for size, at in zip(sizes, (line, there), strict=True)
+        float(level_db(size[_top(size, at)])) for size, at in zip(sizes, (line, later), strict=True)
     ]
     change = levels[1] - levels[0]
     freedom = [2 * test.frf.averages - 2 for test, _ in sides]
@@ -250,14 +250,14 @@ def _compared(
     peak = PeakChange(
         channel=before.channels[channel],
         frequency_before=float(before.frf.frequency[line]),
-        frequency_after=float(after.frf.frequency[there]),
+        frequency_after=float(after.frf.frequency[later]),
         level_before=levels[0],
         level_after=levels[1],
         change=change,
         interval=interval,
         p_value=p_value,
         coherence_before=float(before.frf.coherence[channel, line]),
-        coherence_after=float(after.frf.coherence[channel, there]),
+        coherence_after=float(after.frf.coherence[channel, later]),
         model_change=truths[1] - truths[0],
         verdict="unchanged",
     )
@@ -267,7 +267,7 @@ def _compared(
 def _welch(
     change: float, errors: Sequence[float], freedom: Sequence[float], confidence: float
 ) -> tuple[tuple[float, float], float]:
-    """Interval of a difference of two levels [dB], and p-value of none."""
+    """Interval of a difference of two levels [dB], and p-value of no difference."""
     squares = [error**2 for error in errors]
     total = math.fsum(squares)
     if not 0 < total < math.inf:
@@ -281,7 +281,7 @@ def _welch(
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """P-values adjusted so that one threshold serves for all of them together.
+    """Adjust p-values so that one threshold applies to all of them jointly.
 
     Parameters
     ----------
@@ -291,8 +291,8 @@ def holm(p_values: Sequence[float]) -> list[float]:
     Returns
     -------
     list of float
-        In the same order: the k-th smallest of n times ``n - k + 1``, never less than a smaller
-        one's and at most 1 [-].
+        In the same order [-]: the k-th smallest of n times ``n - k + 1``, made non-decreasing and
+        at most 1.
 
     References
     ----------

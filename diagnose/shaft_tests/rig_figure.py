@@ -1,4 +1,4 @@
-"""Picture of a test before and after: transfer functions, peaks that moved."""
+"""Picture of a test before and after: transfer functions and peaks that changed."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -27,14 +27,14 @@ def rig_figure(
     ----------
     result : BeforeAfter
     channels : sequence of str, optional
-        Those to draw; all by default.
+        Channels to draw; by default all.
     title : bool
-        Above them; a page says the same.
+        Write a title above the picture; a page has its own.
 
     Returns
     -------
     matplotlib.figure.Figure
-        One column a channel: level with its confidence band over the model's, coherence below.
+        One column per channel: level with confidence band and model, coherence below.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def _draw_channel(column: Any, result: BeforeAfter, name: str) -> None:
         frf = test.frf
         low, high = (level_db(side[row]) for side in frf.magnitude_interval)
         level = level_db(frf.value[row])
-        # A disc that holds zero reaches down for ever: the picture ends 20 dB below the estimate.
+        # A disc that contains zero has no lower bound in dB: cut 20 dB below the estimate.
         low = np.maximum(low, level - 20)
         column[0].fill_between(frf.frequency, low, high, color=colour, alpha=0.25, lw=0)
         column[0].plot(frf.frequency, level, color=colour, lw=0.9, label=f"{label}, test")
@@ -97,7 +97,7 @@ def _draw_channel(column: Any, result: BeforeAfter, name: str) -> None:
 
 
 def _mark(axes: Any, changes: Sequence[PeakChange]) -> None:
-    """Write the change beside each peak that changed significantly."""
+    """Write the change next to each peak that changed significantly."""
     for peak in changes:
         if peak.verdict == "unchanged":
             continue

@@ -13,13 +13,13 @@ from ...sim.excitation.forces import band_noise, burst_gate, half_sine, sweep_wa
 
 Float = NDArray[np.float64]
 
-LEFT_OVER = 1e-3  # of a response at the end of its block: a bias of the FRF of that size
+LEFT_OVER = 1e-3  # remainder of a response at the end of its block: bias of the FRF
 
-TINY = 1e-300  # against the logarithm of zero
+TINY = 1e-300  # avoids the logarithm of zero
 
 
 class RigError(ValueError):
-    """A test that cannot be run as asked."""
+    """A test that cannot be run as requested."""
 
 
 # --- the test
@@ -27,7 +27,7 @@ class RigError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class RigSetup:
-    """What every test has.
+    """Settings that all tests share.
 
     Attributes
     ----------
@@ -38,14 +38,14 @@ class RigSetup:
     low, high : float
         Band that is evaluated [Hz].
     quiet : float
-        Running without test force before the first block [s]; the shaft's orders are read there.
+        Time without test force before the first block [s], used to estimate the shaft's orders.
     force_noise : float
         rms of the force cell's noise [N].
 
     Raises
     ------
     RigError
-        A value leaves its range; all at once.
+        A value is out of its range; all faults at once.
     """
 
     block: float = 4.0
@@ -89,7 +89,7 @@ def _least(name: str, value: float, bound: float, unit: str) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class HammerTest(RigSetup):
-    """Blows of an instrumented hammer by hand, without double hits; by default a sledge of 5 kg.
+    """Manual blows of an instrumented hammer, without double hits; by default a 5 kg sledge.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class HammerTest(RigSetup):
     scatter : float
         Standard deviation of the logarithm of the peaks [-].
     contact_time : float
-        Of the half-sine pulse [s]: set by the tip; its spectrum has fallen by 3 dB at
+        Duration of the half-sine pulse [s], set by the tip; its spectrum has fallen by 3 dB at
         ``0.6 / contact_time`` and has its first zero at ``1.5 / contact_time``.
     """
 
@@ -114,7 +114,7 @@ class HammerTest(RigSetup):
         if self.blows < 2:
             faults.append(f"blows = {self.blows} must be >= 2; one gives no coherence")
         if not 0 <= self.scatter <= 0.5:
-            faults.append(f"scatter = {self.scatter} must be in 0 … 0.5; practise")
+            faults.append(f"scatter = {self.scatter} must be in 0 … 0.5; strike more evenly")
         if not 2 / self.sample_rate <= self.contact_time < 0.1 * self.block:
             faults.append(
                 f"contact_time = {self.contact_time} s must be >= {2 / self.sample_rate:g} s, two "
@@ -125,7 +125,7 @@ class HammerTest(RigSetup):
 
 @dataclass(frozen=True, kw_only=True)
 class ShakerTest(RigSetup):
-    """A shaker in bursts or sweeps that have died away within their block: no leakage, no window.
+    """Shaker bursts or sweeps that decay within their block: no leakage, no window.
 
     Attributes
     ----------
@@ -134,10 +134,10 @@ class ShakerTest(RigSetup):
     bursts : int
         At least 2.
     force : float
-        rms during a burst [N]. The force is what acts on the shaft: that a shaker gives less at
-        a resonance is not modelled.
+        rms during a burst [N], as it acts on the shaft; the force drop of a shaker at a resonance
+        is not modelled.
     share : float
-        Of a block in which the shaker acts [-].
+        Fraction of a block in which the shaker acts [-].
     """
 
     kind: Literal["burst-random", "sweep"] = "burst-random"
@@ -157,7 +157,7 @@ class ShakerTest(RigSetup):
 
 
 def free_time(setup: RigSetup) -> float:
-    """Time of a block that is left for the response to die away [s]."""
+    """Time of a block available for the response to decay [s]."""
     return setup.block * (1 - setup.share if isinstance(setup, ShakerTest) else 0.95)
 
 
@@ -166,7 +166,7 @@ def free_time(setup: RigSetup) -> float:
 
 @dataclass(frozen=True)
 class _Kind:
-    """How a test makes its force, finds its blocks and windows them."""
+    """Functions of a kind of test: force, detection of blocks, window."""
 
     name: str
     force: Callable[[Any, np.random.Generator], tuple[Float, NDArray[np.intp]]]
@@ -175,7 +175,7 @@ class _Kind:
 
 
 def _hammer_force(setup: HammerTest, rng: np.random.Generator) -> tuple[Float, NDArray[np.intp]]:
-    """Half-sine pulses, each somewhere in the first fifth of a stretch of 1.3 blocks."""
+    """Half-sine pulses, each starting in the first fifth of an interval of 1.3 blocks."""
     fs = setup.sample_rate
     stretch = 1.3 * setup.block
     begins = setup.quiet + stretch * np.arange(setup.blows)
@@ -218,7 +218,7 @@ def _random_burst(setup: ShakerTest, n: int, rng: np.random.Generator) -> Float:
 
 
 def _sweep(setup: ShakerTest, n: int, rng: np.random.Generator) -> Float:
-    del rng  # the same every time
+    del rng  # deterministic
     return sweep_wave(n, setup.sample_rate, setup.low, setup.high)
 
 
@@ -240,4 +240,4 @@ TEST_KINDS: dict[type, _Kind] = {
     HammerTest: _Kind("hammer", _hammer_force, _hammer_blocks, _hammer_window),
     ShakerTest: _Kind("shaker", _shaker_force, _shaker_blocks, _no_window),
 }
-"""Type of a setup -> how its force, blocks and window are made."""
+"""Type of a setup -> functions for its force, blocks and window."""

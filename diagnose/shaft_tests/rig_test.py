@@ -1,8 +1,8 @@
-"""A hammer or shaker test of a running shaft line, simulated: plant, run, what it measures.
+"""Simulated hammer or shaker test of a running shaft line: plant, run, result.
 
-The measured chain is that of a real test: a force cell and accelerometers with their noise, the
-shaft's own vibration as noise on the responses, blows that scatter; then blocks, H1 or H2,
-coherence and confidence.
+The measuring chain is that of a real test: a force cell and accelerometers with noise, the shaft's
+own vibration as noise on the responses, scattering blows; then blocks, H1 or H2, coherence and
+confidence.
 """
 
 import math
@@ -25,28 +25,28 @@ from .rig_setup import LEFT_OVER, TEST_KINDS, HammerTest, RigError, RigSetup, Sh
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MODES_UP_TO = 3.0  # halves of the sample rate, of the free-free modes that are kept
+_MODES_UP_TO = 3.0  # highest kept free-free mode, over half the sample rate
 
-_ORDERS = 24  # of the shaft's speed that are taken out: blade rate of four blades six times over
+_ORDERS = 24  # removed shaft orders: six harmonics of the blade rate of four blades
 
-# --- what is tested
+# --- tested shaft
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plant:
-    """A running shaft with a place to push it and accelerometers.
+    """A running shaft with a place for the test force, and accelerometers.
 
     Attributes
     ----------
     rotor : Rotor
     reduced : ReducedRotor
-        The same at its speed.
+        Reduced rotor at its speed.
     force : place
-        Where the test force acts.
+        Place of the test force.
     responses : tuple of place
-        Where the accelerometers are.
+        Places of the accelerometers.
     channels : tuple of str
-        Their names.
+        Names of the accelerometers.
     harmonics, broadband : sequence
         Forces of the running shaft itself.
     noise : float
@@ -79,7 +79,7 @@ def rotor_plant(
     broadband: Sequence[Broadband] = (),
     noise: float = 0.0,
 ) -> Plant:
-    """Make a rotor ready for a test.
+    """Prepare a rotor for a test.
 
     Parameters
     ----------
@@ -87,11 +87,11 @@ def rotor_plant(
     speed : float
         [rad/s]
     force : place
-        Where the test force acts, see :mod:`wearstate.sim.shaft_response.places`.
+        Place of the test force, see :mod:`wearstate.sim.shaft_response.places`.
     responses : mapping of str to place
-        Channel -> where its accelerometer is.
+        Channel -> place of its accelerometer.
     sample_rate : float
-        Of the test [Hz]; free-free modes up to three times its half are kept.
+        Sample rate of the test [Hz]; free-free modes up to three times its half are kept.
     harmonics, broadband : sequence
         Forces of the running shaft itself.
     noise : float
@@ -140,7 +140,7 @@ def rotor_plant(
 
 
 def named_place(place: Place) -> Any:
-    """A place by its name, refused where it is a number of a degree of freedom."""
+    """Return a named place; reject the number of a degree of freedom."""
     if isinstance(place, int):
         raise RigError(f"place = {place} must be named, as ('stern', 'y', 'housing')")
     return place
@@ -151,7 +151,7 @@ def named_place(place: Place) -> Any:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RigTest:
-    """What a test gave, and what it should have given.
+    """Result of a test, and the true response.
 
     Attributes
     ----------
@@ -164,9 +164,9 @@ class RigTest:
     force : ndarray, shape (n_blocks, nperseg)
         Blocks of the measured force [N].
     response : ndarray, shape (n_blocks, n_channels, nperseg)
-        Blocks of the measured accelerations, orders of the shaft taken out [m/s^2].
+        Blocks of the measured accelerations, shaft orders removed [m/s^2].
     rejected : tuple of str
-        A sentence for each blow left out.
+        One sentence for each rejected blow.
     """
 
     setup: RigSetup
@@ -192,18 +192,18 @@ def run_test(
     estimator: Estimator = "h1",
     confidence: float = 0.95,
 ) -> RigTest:
-    """Simulate a test and evaluate it as a measured one.
+    """Simulate a test and evaluate it like a measured one.
 
     Parameters
     ----------
     plant : Plant
     setup : HammerTest or ShakerTest
     seed : int
-        Of blows, bursts and all noise.
+        Seed of blows, bursts and all noise.
     estimator : str
         ``h1`` or ``h2``.
     confidence : float
-        Of the disc of a line [-].
+        Confidence of the disc of a line [-].
 
     Returns
     -------
@@ -212,14 +212,14 @@ def run_test(
     Raises
     ------
     RigError
-        Responses outlast a block, the rotor is unstable, or two blows or more were not found.
+        Responses outlast a block, the rotor is unstable, or fewer than two blows were found.
 
     Notes
     -----
-    One record holds the quiet stretch and all blocks; the shaft runs on through it. Its orders are
-    fitted in the quiet stretch, over whole revolutions, and taken out of the record: they are
-    exactly periodic here and the tacho is perfect, which flatters the test. What is left of the
-    shaft's own vibration is noise on the responses, the case H1 is for.
+    One record contains the quiet interval and all blocks, with the shaft running throughout. Its
+    orders are fitted in the quiet interval, over whole revolutions, and removed from the record;
+    they are exactly periodic here and the tacho is perfect, which makes the result optimistic. The
+    rest of the shaft's own vibration is noise on the responses, the case for which H1 is unbiased.
 
     Examples
     --------
@@ -276,23 +276,23 @@ def model_accelerance(plant: Plant, frequency: Float) -> Complex:
 
 
 def _check_decay(plant: Plant, setup: HammerTest | ShakerTest) -> None:
-    """Raise where a response in the band outlasts its block; slower ones below leak little."""
+    """Raise if a response in the band outlasts its block; slower ones below it leak little."""
     if not plant.reduced.stable:
         growth = float(plant.reduced.poles.real.max())
         raise RigError(
-            f"growth rate = {growth:.3g} 1/s must be < 0: the shaft whirls in its films, or "
-            "nothing holds it; change speed, load or moves"
+            f"growth rate = {growth:.3g} 1/s must be < 0: the shaft whirls in its films, or it "
+            "is unsupported; change speed, load or moves"
         )
     free, needed = free_time(setup), needed_time(plant, setup)
     if free < needed:
         raise RigError(
-            f"block = {setup.block} s leaves {free:.3g} s for the response to die away, must leave "
+            f"block = {setup.block} s leaves {free:.3g} s for the response to decay, must leave "
             f">= {needed:.3g} s to {LEFT_OVER:g}; lengthen the block"
         )
 
 
 def needed_time(plant: Plant, setup: RigSetup) -> float:
-    """Time in which the slowest motion of the band dies away [s]."""
+    """Time in which the slowest motion in the band decays [s]."""
     poles = plant.reduced.poles
     hertz = np.abs(poles) / (2 * math.pi)
     heard = (hertz > setup.low / 1.5) & (hertz < setup.high * 1.5)
@@ -300,7 +300,7 @@ def needed_time(plant: Plant, setup: RigSetup) -> float:
 
 
 def _accelerations(plant: Plant, setup: RigSetup, force: Float, rng: np.random.Generator) -> Float:
-    """Of every accelerometer, under the test force and the shaft's own [(n_channels, n)]."""
+    """Signals of the accelerometers under test force and own forces (n_channels, n) [m/s^2]."""
     found = time_response(
         plant.reduced,
         plant.responses,
@@ -315,7 +315,7 @@ def _accelerations(plant: Plant, setup: RigSetup, force: Float, rng: np.random.G
 
 
 def _without_orders(plant: Plant, setup: RigSetup, response: Float) -> Float:
-    """Take out the orders of the shaft, as found in the quiet stretch."""
+    """Remove the orders of the shaft, as estimated in the quiet interval."""
     if plant.speed_hz <= 0:
         return response
     phase = plant.speed_hz * np.arange(response.shape[-1]) / setup.sample_rate

@@ -1,8 +1,8 @@
-"""Sags of a line whose films may rupture otherwise than its scene says.
+"""Sags of a line whose films may rupture differently from its scene.
 
-Where a film ends is not known of a machine: at no pressure and no slope (``periodic``), or where
-the pressure of the whole film would fall below the atmosphere (``guembel``). Each is asked, and
-their answers are weighted by how well they explain what was measured.
+The rupture condition of a real film is unknown: zero pressure and slope (``periodic``), or
+truncation of negative pressure (``guembel``). Both are evaluated, and the results are weighted by
+how well they explain the measurements.
 
 References
 ----------
@@ -23,9 +23,9 @@ from .sag_model import MeasuredReactions, MeasuredTransfer, Prior, SagError
 from .sags import SagPosterior, estimate_sags
 
 CONDITIONS = ("periodic", "guembel")
-"""How a film may rupture on a shaft line."""
+"""Possible rupture conditions of the films of a shaft line."""
 
-_NEAR = 2.0  # deviations of a reaction from none
+_NEAR = 2.0  # standard deviations between a reaction and zero
 
 
 def estimate_over_films(
@@ -35,28 +35,28 @@ def estimate_over_films(
     *,
     prior: Prior | None = None,
 ) -> SagPosterior:
-    """Posterior of the sags over the conditions of rupture, equally likely beforehand.
+    """Posterior of the sags over the rupture conditions, with equal prior probabilities.
 
     Parameters
     ----------
     scene, transfers, measured, prior
-        As of :func:`.shaft_tests.sags.estimate_sags`.
+        As in :func:`.shaft_tests.sags.estimate_sags`.
 
     Returns
     -------
     SagPosterior
-        Mean and covariance of the mixture; all else of the likelier condition; ``films`` their
-        probabilities. Reactions alone know no film: then as of the scene.
+        Mean and covariance of the mixture, everything else for the likelier condition; ``films``
+        holds the probabilities. Reactions alone involve no film: then as in the scene.
 
     Raises
     ------
     SagError, ShaftFilmError
-        As of :func:`.shaft_tests.sags.estimate_sags`, of the scene's own condition.
+        As in :func:`.shaft_tests.sags.estimate_sags`, for the scene's own condition.
 
     Notes
     -----
     The evidence of a condition is ``exp(-cost / 2) sqrt(det spread)``, by Laplace's method and up
-    to a factor that all conditions share.
+    to a factor common to all conditions.
     """
     if not transfers or scene.film.rung != "direct":
         return estimate_sags(scene, transfers, measured, prior=prior)
@@ -73,12 +73,12 @@ def estimate_over_films(
 
 
 def mixed(found: dict[str, SagPosterior]) -> SagPosterior:
-    """Mixture of posteriors of one question, by their evidence.
+    """Mixture of posteriors, weighted by their evidence.
 
     Parameters
     ----------
     found : dict
-        Condition -> posterior; one or more.
+        Condition -> posterior; at least one.
     """
     evidence = np.array([_evidence(one) for one in found.values()])
     share = np.exp(evidence - evidence.max())
@@ -86,21 +86,21 @@ def mixed(found: dict[str, SagPosterior]) -> SagPosterior:
     best = list(found.values())[int(np.argmax(share))]
     means = np.array([one.mean for one in found.values()])
     mean = share @ means
-    apart = means - mean
+    offsets = means - mean
     within = np.tensordot(share, [one.covariance for one in found.values()], axes=1)
-    between = np.einsum("c,ca,cb->ab", share, apart, apart)
+    between = np.einsum("c,ca,cb->ab", share, offsets, offsets)
     films = dict(zip(found, share.tolist(), strict=True))
     return replace(best, mean=mean, covariance=within + between, films=films)
 
 
 def _evidence(found: SagPosterior) -> float:
-    """Logarithm, up to a constant that all have."""
+    """Logarithm of the evidence, up to a common constant."""
     volume = np.linalg.slogdet(found.spread / np.outer(found.scale, found.scale))[1]
     return float(-found.misfit * found.freedom + volume) / 2
 
 
 def nearly_unloaded(scene: ShaftScene, found: SagPosterior) -> tuple[str, ...]:
-    """Bearings that, by the sags found, may carry nothing: there two sags explain one test.
+    """Bearings that may be unloaded at the estimated sags, so that two sags explain one test.
 
     Parameters
     ----------
@@ -110,12 +110,12 @@ def nearly_unloaded(scene: ShaftScene, found: SagPosterior) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Those whose reaction is less than two of its deviations from none, or is none.
+        Bearings whose reaction is less than two standard deviations above zero.
 
     Notes
     -----
-    A film answers the load it carries whichever way it acts: transfer functions tell a journal that
-    is pressed down lightly hardly from one pressed up as lightly.
+    A film responds to the size of its load, whatever the direction: transfer functions hardly
+    distinguish a journal pressed down lightly from one pressed up as lightly.
     """
     line = alignment_line(scene)
     line = line.moved({name: -sag for name, sag in zip(found.bearings, found.mean, strict=True)})

@@ -1,11 +1,12 @@
-"""A shaft line with all that is not known of it, asked what a test of it would show.
+"""Model of a shaft line with all its unknowns, which predicts the result of a test.
 
-The unknowns are the sags and what else is not known of a line: housings, oil, the films' own
+The unknowns are the sags and other uncertain properties: housings, oil, the films' own
 coefficients, the gains of the sensors. Each has a normal prior. Measured transfer functions and
-reactions are compared with the model's in units of their noise, with slopes by every unknown.
+reactions are compared with the model's in units of their noise, with derivatives with respect to
+every unknown.
 
-A line that rises or tilts as a whole lies as before. Sags are therefore against the line through
-two bearings, the first and the last unless others are named.
+Raising or tilting the whole line has no effect. Sags are therefore relative to the line through
+two bearings, by default the first and the last.
 """
 
 import math
@@ -43,10 +44,10 @@ _FILM_ENTRIES = 16
 
 
 class SagError(ValueError):
-    """Data or a prior from which no sag can be told."""
+    """Data or a prior from which no sag can be estimated."""
 
 
-# --- what is measured
+# --- measurements
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,13 +61,13 @@ class MeasuredTransfer:
     value : numpy.ndarray [shape=(n_lines, n_resp)]
         Accelerance, complex [(m/s^2)/N].
     covariance : numpy.ndarray [shape=(n_lines, n_resp, n_resp)]
-        Of its noise, Hermitian: the mean of ``e e^H`` for circular complex errors e.
+        Covariance of its noise, Hermitian: mean of ``e e^H`` for circular complex errors e.
     speed : float
-        Of the shaft in the test, > 0 [rad/s].
+        Speed of the shaft in the test, > 0 [rad/s].
     force : place
-        Where the test force acts.
+        Place of the test force.
     responses : tuple of place
-        Where the accelerometers are.
+        Places of the accelerometers.
 
     Raises
     ------
@@ -94,14 +95,14 @@ class MeasuredTransfer:
         if not (np.isfinite(self.value).all() and np.isfinite(self.covariance).all()):
             faults.append("value and covariance must be finite; leave out lines without coherence")
         if not 0 < self.speed < math.inf:
-            faults.append(f"speed = {self.speed} rad/s must be > 0; without rotation is no film")
+            faults.append(f"speed = {self.speed} rad/s must be > 0; a film needs rotation")
         if faults:
             raise SagError("\n".join(faults))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredReactions:
-    """Reactions as jacks told them.
+    """Reactions measured by jacking.
 
     Attributes
     ----------
@@ -110,7 +111,7 @@ class MeasuredReactions:
     deviations : mapping of str to float
         Standard deviation of each, > 0 [N].
     condition : str
-        Of the scene, in which they were measured.
+        Condition of the scene during the measurement.
     """
 
     reactions: Mapping[str, float]
@@ -118,28 +119,29 @@ class MeasuredReactions:
     condition: str = "cold"
 
 
-# --- what is not known
+# --- unknowns
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prior:
-    """What is known before any test; standard deviations.
+    """Prior standard deviations, before any test.
 
     Attributes
     ----------
     sag : float or None
-        Of each bearing's sag [m]; by default what takes a mean bearing's load away, see
+        Sag of each bearing [m]; by default the sag that unloads an average bearing, see
         :func:`usual_sag`.
     datum : tuple of str
-        Two bearings against whose line the others sag; by default the first and the last.
+        Two bearings whose connecting line is the datum of the sags; by default the first and the
+        last.
     housing_stiffness, housing_damping, viscosity, clearance : float
-        Of the natural logarithm [-]: about the relative error. A uniform tolerance of +-a has
-        ``a / sqrt(3)``.
+        Natural logarithm of the quantity [-]: about the relative error. A uniform tolerance of +-a
+        has ``a / sqrt(3)``.
     film : float
-        Of every coefficient of every film over the film's size [-]: the error of the film's model
-        and of its mesh, see :mod:`wearstate.sim.shaft_films.on_oil_films`.
+        Every coefficient of every film, relative to the size of the film's coefficients [-]: error
+        of the film model and of its mesh, see :mod:`wearstate.sim.shaft_films.on_oil_films`.
     gain : float
-        Of the logarithm of each response's gain over the force's [-].
+        Logarithm of each response's gain over that of the force [-].
     """
 
     sag: float | None = None
@@ -153,7 +155,7 @@ class Prior:
 
 
 class Unknowns(NamedTuple):
-    """Deviations of all unknowns and what a unit of each changes; gains, if any, come last."""
+    """Standard deviations of all unknowns and their unit changes; gains, if any, come last."""
 
     sagging: tuple[int, ...]  # bearings
     deviations: Vector  # (p + n_gains,)
@@ -162,17 +164,17 @@ class Unknowns(NamedTuple):
 
     @property
     def sags(self) -> slice:
-        """Where the sags are."""
+        """Slice of the sags among the unknowns."""
         return slice(0, len(self.sagging))
 
     def change(self, values: Vector) -> Vector:
-        """Of the whole line (n, 42)."""
+        """Change of the whole line (n, 42)."""
         p = self.directions.shape[0]
         return np.asarray(np.tensordot(values[:p], self.directions, axes=1))
 
 
 def usual_sag(line: AlignmentLine) -> float:
-    """Sag at which a bearing of the line loses its load, the mean of its inner bearings.
+    """Sag at which a bearing of the line loses its load; mean over the inner bearings.
 
     Parameters
     ----------
@@ -196,19 +198,19 @@ def usual_sag(line: AlignmentLine) -> float:
 
 
 def unknowns_of(scene: ShaftScene, prior: Prior, gains: int = 0) -> Unknowns:
-    """The unknowns of a scene's line under a prior, and of so many responses' gains."""
+    """Unknowns of a scene's line under a prior, with the gains of so many responses."""
     names = [bearing.name for bearing in scene.bearings]
     n = len(names)
     datum = prior.datum or (names[0], names[-1])
-    strange = [name for name in datum if name not in names]
-    if strange or len(set(datum)) != 2:
+    unknown = [name for name in datum if name not in names]
+    if unknown or len(set(datum)) != 2:
         raise SagError(
-            f"datum = {', '.join(datum)} must be two bearings of {', '.join(names)}; a line that "
-            "rises or tilts as a whole lies as before"
+            f"datum = {', '.join(datum)} must be two bearings of {', '.join(names)}; raising or "
+            "tilting the whole line has no effect"
         )
     sagging = tuple(i for i, name in enumerate(names) if name not in datum)
     if not sagging:
-        raise SagError("bearings = 2 must be >= 3: a shaft on two bearings does not feel a sag")
+        raise SagError("bearings = 2 must be >= 3: a sag has no effect on a shaft on two bearings")
     size = usual_sag(alignment_line(scene)) if prior.sag is None else prior.sag
     rows = [(size, -unit_change(n, i, "bore")) for i in sagging]
     rows += _nuisances(n, prior)
@@ -223,7 +225,7 @@ def unknowns_of(scene: ShaftScene, prior: Prior, gains: int = 0) -> Unknowns:
 
 
 def _nuisances(n: int, prior: Prior) -> list[tuple[float, Vector]]:
-    """Deviation and change of what is not asked for."""
+    """Standard deviation and unit change of each nuisance parameter."""
     oil = no_change(n)
     for i in range(n):
         oil = oil + unit_change(n, i, "viscosity")
@@ -239,11 +241,11 @@ def _nuisances(n: int, prior: Prior) -> list[tuple[float, Vector]]:
     return rows
 
 
-# --- the question
+# --- the estimation problem
 
 
 class WhiteTest(NamedTuple):
-    """A measured test, its noise made white."""
+    """A measured test with whitened noise."""
 
     line: FreeLine
     white: Complex  # (n_lines, n_resp, n_resp), times the errors
@@ -252,7 +254,7 @@ class WhiteTest(NamedTuple):
 
 
 class Jacks(NamedTuple):
-    """Measured reactions with the line that bears them."""
+    """Measured reactions, and the line that they belong to."""
 
     line: AlignmentLine
     condition: Condition
@@ -262,7 +264,7 @@ class Jacks(NamedTuple):
 
 
 class Question(NamedTuple):
-    """A line, what is not known of it, and what was measured."""
+    """A line, its unknowns and the measurements."""
 
     model: LineModel
     unknowns: Unknowns
@@ -277,7 +279,7 @@ def question_of(
     measured: MeasuredReactions | None,
     prior: Prior,
 ) -> Question:
-    """Line, unknowns and data, ready for trials; arguments as of `estimate_sags`."""
+    """Line, unknowns and data, ready for trials; arguments as in `estimate_sags`."""
     model = line_model(scene)
     tests, first = [], 0
     for test in transfers:
@@ -294,7 +296,7 @@ def question_of(
 
 
 def white_test(model: LineModel, test: MeasuredTransfer, gains: slice) -> WhiteTest:
-    """A test with the shaft condensed for it, and its noise made white."""
+    """Test with the shaft condensed for it, and whitened noise."""
     line = free_line(
         model, test.frequencies, speed=test.speed, forces=[test.force], responses=test.responses
     )
@@ -314,10 +316,10 @@ def _jacks(scene: ShaftScene, measured: MeasuredReactions) -> Jacks:
     conditions = alignment_conditions(scene)
     if measured.condition not in conditions:
         raise SagError(f"condition = '{measured.condition}' must be one of {', '.join(conditions)}")
-    strange = sorted(set(measured.reactions) - set(line.names))
-    if strange:
+    unknown = sorted(set(measured.reactions) - set(line.names))
+    if unknown:
         raise SagError(
-            f"reactions of {', '.join(strange)} must be of bearings: {', '.join(line.names)}"
+            f"reactions of {', '.join(unknown)} must be of bearings: {', '.join(line.names)}"
         )
     missing = [n for n in measured.reactions if not measured.deviations.get(n, 0.0) > 0]
     if missing:
@@ -335,7 +337,7 @@ def _jacks(scene: ShaftScene, measured: MeasuredReactions) -> Jacks:
 
 
 class SagTrial(NamedTuple):
-    """A trial: misfit of all that was measured and of the prior, over its deviation."""
+    """A trial: misfit of the measurements and of the prior, over their standard deviations."""
 
     values: Vector
     films: dict[float, BeamFilm]  # speed -> balance
@@ -345,7 +347,7 @@ class SagTrial(NamedTuple):
 
 
 def trial_at(question: Question, values: Vector, start: dict[float, BeamFilm]) -> SagTrial | None:
-    """The trial, or none where the line does not rest."""
+    """Evaluate a trial; None if the line has no equilibrium."""
     change = question.unknowns.change(values)
     model = question.model.changed(change)
     films = {}
@@ -388,7 +390,7 @@ def _gains(question: Question, test: WhiteTest, values: Vector) -> Vector:
 
 
 def whitened(test: WhiteTest, errors: Complex) -> Vector:
-    """Errors (..., n_lines, n_resp) as real numbers of unit deviation (..., 2 n_lines n_resp)."""
+    """Errors (..., n_lines, n_resp) as real numbers of unit variance (..., 2 n_lines n_resp)."""
     white = np.einsum("lab,...lb->...la", test.white, errors)
     flat = white.reshape(*white.shape[:-2], -1)
     return np.concatenate([flat.real, flat.imag], axis=-1)
@@ -411,7 +413,7 @@ def _jack_misfit(question: Question, values: Vector) -> Vector:
 
 
 def slopes_at(question: Question, point: SagTrial) -> Vector:
-    """Of what the model says over its deviation, by the unknowns (n_data, p)."""
+    """Derivatives of the scaled predictions with respect to the unknowns (n_data, p)."""
     own = question.unknowns
     p = own.directions.shape[0]
     change = own.change(point.values)

@@ -1,4 +1,4 @@
-"""What tests of a shaft line say of its sags, and the test to do next: table, text, picture."""
+"""Sags of a shaft line from its tests, and the next test: table, text, picture."""
 
 import math
 import textwrap
@@ -22,30 +22,30 @@ from .sag_model import MeasuredReactions, Prior, SagError
 from .sags import SagPosterior
 
 CONFIDENCE = 0.9
-"""Of the intervals told [-]."""
+"""Confidence of the reported intervals [-]."""
 
-_GAIN = 0.02 / math.sqrt(3)  # of sensors calibrated before the test, to 2 per cent
+_GAIN = 0.02 / math.sqrt(3)  # sensors are calibrated before the test to 2 per cent
 _SHOWN = 3  # tests proposed
-_UNDECIDED = 0.05  # probability of a condition of the films: below it the other is taken as sure
-_WORTH = 0.1  # of the variance: less is not worth a test
+_UNDECIDED = 0.05  # probability of a rupture condition: below it the other one is certain
+_WORTH = 0.1  # smallest relative reduction of the variance that is worth a test
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SagReport:
-    """Sags of a line by its tests, and what to test next.
+    """Sags of a line from its tests, and proposals for the next test.
 
     Attributes
     ----------
     posterior : SagPosterior
     tests : tuple of LineTest
     reactions : MeasuredReactions or None
-        Given as such and told by jacking curves.
+        Reactions given directly and from jacking curves.
     planned : tuple of PlannedTest
-        The most telling first.
+        Proposed tests, the most informative first.
     jacked : tuple of JackedBearing
         Jacking curves.
     unloaded : tuple of str
-        Bearings about which two sags may explain the tests.
+        Bearings for which two sags may explain the tests.
     """
 
     posterior: SagPosterior
@@ -57,25 +57,24 @@ class SagReport:
 
     @property
     def doubts(self) -> list[str]:
-        """What the interval of each bearing does not say, one sentence each."""
+        """Doubts that the intervals do not include, one sentence each."""
         films = self.posterior.films
         texts = []
         if min(films.values(), default=0.0) > _UNDECIDED:
             shares = ", ".join(f"{name} {share:.0%}" for name, share in films.items())
             texts.append(
-                f"the films may rupture either way ({shares}): mean and interval are of both"
+                f"the films may rupture either way ({shares}): mean and interval include both"
             )
         if self.unloaded:
             texts.append(
-                f"{', '.join(self.unloaded)} may carry nothing: about that, two sags some "
-                "hundredths of a millimetre apart explain a test; jack it, or test again after "
-                "raising it"
+                f"{', '.join(self.unloaded)} may be unloaded: then two sags some hundredths of a "
+                "millimetre apart explain a test; jack it, or raise it and test again"
             )
         return texts
 
     @property
     def sources(self) -> list[str]:
-        """What each test and each jacking curve told, one line each."""
+        """Summary of each test and each jacking curve, one line each."""
         return [*(test.text for test in self.tests), *(one.text for one in self.jacked)]
 
     @property
@@ -85,8 +84,8 @@ class SagReport:
         against = f"against the line through {' and '.join(found.datum)}"
         if not found.plausible:
             return (
-                f"the line as described does not explain what was measured (misfit "
-                f"{found.misfit:.2f}, must be about 1): reject these sags; check places, speed, "
+                f"the line as described does not explain the measurements (misfit "
+                f"{found.misfit:.2f}, must be about 1): discard these sags; check places, speed, "
                 "oil and housings of the scene"
             )
         sure = [
@@ -112,26 +111,26 @@ def sag_report(
     Parameters
     ----------
     scene : Scene
-        The line as it was aligned, of the machine propulsion-shaft.
+        The line as aligned, of the machine propulsion-shaft.
     tests : sequence of Path
-        Of :func:`.shaft_tests.measured_tests.read_tests`.
+        Files for :func:`.shaft_tests.measured_tests.read_tests`.
     reactions : Path, optional
-        Of :func:`.shaft_tests.measured_tests.read_reactions`.
+        File for :func:`.shaft_tests.measured_tests.read_reactions`.
     curves : Path, optional
-        Of :func:`.shaft_tests.jacking_tests.read_curves`, of bearings whose reactions are not
-        given.
+        File for :func:`.shaft_tests.jacking_tests.read_curves`, with bearings that are not in
+        `reactions`.
     condition : str
-        In which these were measured.
+        Condition of the scene during these measurements.
 
     Returns
     -------
     SagReport
-        With the gains of sensors and force cells as calibrated to 2 %.
+        Gains of sensors and force cells are assumed to be calibrated to 2 %.
 
     Raises
     ------
     DataError, SagError, ShaftFilmError
-        As of what reads and estimates.
+        As in reading and estimation.
     """
     if not isinstance(scene, ShaftScene):
         raise SagError(
@@ -166,7 +165,7 @@ def sag_report(
 
 
 def _together(one: MeasuredReactions | None, other: MeasuredReactions) -> MeasuredReactions:
-    """Reactions of a table and of curves."""
+    """Reactions from a table and from curves, merged."""
     if one is None:
         return other
     twice = sorted(set(one.reactions) & set(other.reactions))
@@ -183,7 +182,7 @@ def _together(one: MeasuredReactions | None, other: MeasuredReactions) -> Measur
 
 
 def sagged(scene: ShaftScene, found: SagPosterior) -> ShaftScene:
-    """The scene with its bearings where the tests put them; as it is where these are implausible.
+    """Scene with the bearings at the estimated sags; unchanged if these are implausible.
 
     Examples
     --------
@@ -205,7 +204,7 @@ def sagged(scene: ShaftScene, found: SagPosterior) -> ShaftScene:
 
 
 def sag_table(report: SagReport) -> dict[str, Any]:
-    """The same in SI, ready for JSON."""
+    """Report in SI, ready for JSON."""
     found = report.posterior
     return {
         "headline": report.headline,
@@ -248,7 +247,7 @@ def sag_table(report: SagReport) -> dict[str, Any]:
 
 
 def sag_text(report: SagReport) -> str:
-    """The same for a terminal, in mm."""
+    """Report for a terminal, in mm."""
     found = report.posterior
     lines = [f"sags: {report.headline}"]
     lines += [f"  {' '.join(row)}" for row in _aligned(sag_rows(report))]
@@ -257,7 +256,7 @@ def sag_text(report: SagReport) -> str:
 
 
 def sag_rows(report: SagReport) -> list[tuple[str, str, str]]:
-    """Bearing, sag and interval [mm], with a head."""
+    """Bearing, sag and interval [mm], with a heading."""
     found = report.posterior
     rows = [("bearing", "sag mm", f"{CONFIDENCE:.0%} interval")]
     for name, mean, (low, high) in zip(
@@ -277,21 +276,21 @@ def _next_texts(report: SagReport, found: SagPosterior) -> list[str]:
 
 
 def next_texts(report: SagReport) -> list[str]:
-    """The tests that tell most, and what they would leave."""
+    """The most informative tests, and the uncertainty that they would leave."""
     texts = []
     for one in report.planned[:_SHOWN]:
         left = ", ".join(f"{1e3 * deviation:.3f}" for deviation in one.deviations)
         unit = f"error {one.force:.3g} N" if one.jack else f"{one.force:.3g} N rms"
         texts.append(
-            f"{one.text} ({unit}): takes {one.gain:.0%} of the variance, leaves ±{left} mm"
+            f"{one.text} ({unit}): reduces the variance by {one.gain:.0%}, leaves ±{left} mm"
         )
     if report.planned and report.planned[0].gain < _WORTH:
-        texts.append("none of them is worth much: measure oil, clearances and housings instead")
+        texts.append("none of them gains much: measure oil, clearances and housings instead")
     return texts
 
 
 def sag_images(report: SagReport) -> list[PageImage]:
-    """Sag of every bearing with its interval, and what the next tests would leave."""
+    """Pictures: sag of every bearing with its interval, and gain of the next tests."""
     return [
         drawn_alone(partial(_draw_sags, report=report), height=3.2),
         drawn_alone(partial(_draw_next, report=report), height=3.2),
@@ -310,7 +309,7 @@ def _draw_sags(axes: Any, report: SagReport) -> None:
     names = [short_name(name, 20) for name in found.bearings]
     axes.set_xticks(at, names, rotation=20, ha="right", fontsize=9)
     axes.set_xlim(-0.5, at.size - 0.5)
-    axes.set(ylabel="sag [mm]", title="Sags by the tests")
+    axes.set(ylabel="sag [mm]", title="Sags from the tests")
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
 
@@ -319,6 +318,6 @@ def _draw_next(axes: Any, report: SagReport) -> None:
     shown = report.planned[:_SHOWN][::-1]
     names = [textwrap.fill(one.text, 26) for one in shown]
     axes.barh(names, [100 * one.gain for one in shown], color="#b3541e")
-    axes.set(xlim=(0, 100), xlabel="share of the variance taken [%]", title="Test next")
+    axes.set(xlim=(0, 100), xlabel="reduction of the variance [%]", title="Next test")
     axes.tick_params(axis="y", labelsize=8)
     axes.grid(alpha=0.3)

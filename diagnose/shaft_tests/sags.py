@@ -1,8 +1,7 @@
-"""How far each bearing of a shaft line has sagged, from measured transfer functions and reactions.
+"""Sag of each bearing of a shaft line, from measured transfer functions and reactions.
 
-Gauss-Newton finds the most probable values of all unknowns, and the curvature there their
-covariance: the posterior of a linear model with normal errors, about the mode of one that is not
-linear.
+Gauss-Newton finds the most probable values of all unknowns, and the curvature there gives their
+covariance: the posterior of the model linearised about its mode, with normal errors.
 
 References
 ----------
@@ -36,15 +35,15 @@ from .sag_model import (
 Vector = NDArray[np.float64]
 
 _MOST_STEPS = 15
-_SETTLED = 0.1  # of a standard deviation: less than what a posterior is read to
-_CLOSE = 1.0  # the same after the last step
-_LONGEST = 0.7  # step of a sag over its prior's deviation
-_WORSE = 4.0  # factor of the cost that a step may bring
-_IMPLAUSIBLE = 1e-3  # probability of the misfit at a mode: below it another one is looked for
+_SETTLED = 0.1  # of a standard deviation: finer than a posterior is read
+_CLOSE = 1.0  # standard deviations, after the last step
+_LONGEST = 0.7  # longest step of a sag, over its prior standard deviation
+_WORSE = 4.0  # largest factor by which a step may raise the cost
+_IMPLAUSIBLE = 1e-3  # probability of the misfit at a mode: below it another one is sought
 _MOST_HALVINGS = 6
 
 
-# --- what was found
+# --- result
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,31 +53,30 @@ class SagPosterior:
     Attributes
     ----------
     bearings : tuple of str
-        k of them, those that may have sagged.
+        The k bearings that may have sagged.
     datum : tuple of str
-        The two against whose line they have.
+        The two bearings whose connecting line is the datum.
     mean : numpy.ndarray [shape=(k,)]
-        [m], downward positive, on top of those of the scene.
+        Sags in addition to those of the scene, downward positive [m].
     covariance : numpy.ndarray [shape=(k, k)]
         [m^2]
     prior_deviation : float
         [m]
     misfit : float
-        Chi-square over its degrees of freedom: about 1 where model and noise are what they are
-        said to be [-].
+        Chi-square over its degrees of freedom: about 1 if model and noise are correct [-].
     freedom : int
-        Real numbers measured.
+        Number of measured real numbers.
     values, spread : numpy.ndarray
-        Of all unknowns at the mode, and their covariance; sags first.
+        All unknowns at the mode, and their covariance; sags first.
     steps : int
-        Of Gauss-Newton.
+        Number of Gauss-Newton steps.
     settled : bool
-        Whether the mode is less than a standard deviation away; otherwise mean and covariance are
-        those of where the search stopped.
+        Whether the mode is less than a standard deviation away; otherwise mean and covariance
+        belong to the point at which the search stopped.
     scale : numpy.ndarray
         Prior deviation of each unknown.
     films : dict
-        Probability of each condition of film rupture that was asked; empty where one was taken.
+        Probability of each rupture condition of the films; empty if only one was assumed.
     """
 
     bearings: tuple[str, ...]
@@ -102,16 +100,16 @@ class SagPosterior:
 
     @property
     def plausible(self) -> bool:
-        """Whether model and noise explain what was measured; otherwise trust no interval."""
+        """Whether model and noise explain the measurements; otherwise trust no interval."""
         return float(chdtrc(self.freedom, self.misfit * self.freedom)) > _IMPLAUSIBLE
 
     def interval(self, confidence: float = 0.9) -> Vector:
-        """Least and largest sag of each bearing [shape=(k, 2)], [m]."""
+        """Interval of the sag of each bearing [shape=(k, 2)], [m]."""
         width = float(ndtri((1 + confidence) / 2)) * self.deviation
         return np.stack([self.mean - width, self.mean + width], axis=1)
 
     def holds(self, sags: Vector, confidence: float = 0.9) -> bool:
-        """Whether the elliptic region of all sags together holds these [shape=(k,)]."""
+        """Whether the joint elliptic region of all sags contains these [shape=(k,)]."""
         off = self.mean - np.asarray(sags)
         distance = float(off @ np.linalg.solve(self.covariance, off))
         return distance <= float(chdtri(off.size, 1 - confidence))
@@ -130,15 +128,15 @@ def estimate_sags(
     Parameters
     ----------
     scene : ShaftScene
-        The line as it was aligned.
+        The line as aligned.
     transfers : sequence of MeasuredTransfer
         One for each test.
     measured : MeasuredReactions, optional
     prior : Prior, optional
-        By default that of a line whose housings and oil are known by their data sheets.
+        By default that of a line whose housings and oil are known from data sheets.
     start : sequence of float, optional
-        Sags to start from, one for each bearing but the datum [m]. By default none, and where what
-        is found from there is implausible, each bearing sagged by a deviation of the prior.
+        Initial sags, one for each bearing except the datum [m]. By default zero; if the result is
+        implausible, each bearing in turn is sagged by a prior standard deviation.
 
     Returns
     -------
@@ -147,15 +145,15 @@ def estimate_sags(
     Raises
     ------
     SagError
-        Nothing is measured, or a name is unknown.
+        There is no measurement, or a name is unknown.
     ShaftFilmError
-        The line does not rest on its films even without a sag.
+        The line has no equilibrium on its films even without a sag.
 
     Notes
     -----
     The mode minimises ``sum |L^-1 (d - H)|^2 2 + sum (t / s)^2`` over the unknowns t, with L the
     factor of the noise; real and imaginary part of a circular error each have half its variance.
-    A film answers the load it carries either way: about a bearing without load there may be two
+    A film responds to its load alike in both directions: for an unloaded bearing there may be two
     modes, some hundredths of a millimetre apart, and the one found need not be the better.
 
     Examples
@@ -177,7 +175,7 @@ def estimate_sags(
         if best is not None and chdtrc(best.slopes.shape[0], best.cost) > _IMPLAUSIBLE:
             break
     if best is None:
-        raise SagError("no sag was found with which the line rests on its films; check the scene")
+        raise SagError("the line has no equilibrium on its films at any sag; check the scene")
     return _posterior(question, best)
 
 
@@ -193,25 +191,25 @@ class _Mode(NamedTuple):
 
 
 def _lower(one: _Mode | None, other: _Mode | None) -> _Mode | None:
-    """The mode of the lower cost."""
+    """Return the mode with the lower cost."""
     if one is None or (other is not None and other.cost < one.cost):
         return other
     return one
 
 
 def _starts(question: Question) -> list[Vector]:
-    """No sag, and each bearing sagged by a deviation, down and up."""
+    """Zero sag, and each bearing sagged by a standard deviation, down and up."""
     own = question.unknowns
     size = np.diag(own.deviations[own.sags])
     return [np.zeros(len(size)), *size, *-size]
 
 
 def _mode(question: Question, sags: Vector) -> _Mode | None:
-    """Gauss-Newton from sags and the mean of all else; none where the line does not rest there.
+    """Gauss-Newton from initial sags and the mean of all else; None without an equilibrium there.
 
-    A film's coefficients jump by a per cent as the nodes of its mesh fill, more than a good test's
-    noise, and the films' own errors among the unknowns make up for it only in the next step. So no
-    step is asked to lower the cost; the mode is that of the linear model at the last trial.
+    A film's coefficients jump by a per cent as the nodes of its mesh fill. This exceeds the noise
+    of a good test, and the films' errors among the unknowns compensate it only in the next step.
+    Hence a step need not lower the cost; the mode is that of the linear model at the last trial.
     """
     own = question.unknowns
     values = np.zeros(own.deviations.size)
@@ -242,7 +240,7 @@ def _step(question: Question, point: SagTrial, slopes: Vector) -> Vector:
 
 
 def _followed(question: Question, point: SagTrial, step: Vector) -> SagTrial | None:
-    """The trial after the step, shortened where it goes too far to be linear."""
+    """Trial after the step, which is shortened if it is too long for the linear model."""
     own = question.unknowns
     share = min(1.0, _LONGEST / float((np.abs(step) / own.deviations)[own.sags].max()))
     for _ in range(_MOST_HALVINGS):
