@@ -513,7 +513,7 @@ def _refuse_gaps(signals: NDArray[Any], names: Sequence[str]) -> None:
         if bad.size:
             faults.append(
                 f"channel {name} has {bad.size} sample(s) that are not finite, must be 0, first at "
-                f"index {bad[0]}; cut or mend the gap"
+                f"index {bad[0]}; cut or repair the gap"
             )
     if faults:
         raise ValueError("\n".join(faults))

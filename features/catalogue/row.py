@@ -108,8 +108,8 @@ def feature_names(
     channel_names : sequence of str
         Names of the vibration channels, unique.
     fs : float
-        Sample rate [Hz]; it decides the bands, whose edges are part of the name.
-    Sample rate [Hz]; it determines the bands, whose edges are part of the name.
+        Sample rate [Hz]; it determines the bands, whose edges are part of the name.
+    tacho : bool
         Whether there is a tacho.
     pulses_per_revolution : int
         Pulses of the tacho in one revolution.
@@ -373,8 +373,9 @@ def feature_row(
         of one pulse, is a cylinder pressure: it has only features of its own.
     settings : Settings
         Bands, bins and orders; the kind of machine, the geometry of a bearing.
-    Default for training; all but kurtogram, cyclic coherence and modal fit; everything. Features
-    whose requirements are not met are absent; `absent_features` gives the reasons.
+    feature_set : {"standard", "core", "complete"}
+        Default for training; all but kurtogram, cyclic coherence and modal fit; everything.
+        Features whose requirements are not met are absent; `absent_features` gives the reasons.
     only : sequence of str, optional
         Names of features, or of single values, from any set; nothing else is computed. An unmet
         requirement is then an error.
@@ -548,7 +549,7 @@ def _fault(signal: Real, channel: str) -> str:
     if wrong.size:
         return (
             f"{channel} has {wrong.size} non-finite samples, the first at {wrong[0]}, must have 0; "
-            "cut or mend the recording"
+            "cut or repair the recording"
         )
     large = np.flatnonzero(np.abs(signal) > LARGEST_SAMPLE)
     return (

@@ -400,7 +400,7 @@ def _check_finite(force: Float, response: Float) -> None:
         wrong = np.count_nonzero(~np.isfinite(values))
         if wrong:
             raise ValueError(
-                f"{name} has {wrong} non-finite samples, must have 0; cut or mend the recording"
+                f"{name} has {wrong} non-finite samples, must have 0; cut or repair the recording"
             )
 
 

@@ -165,7 +165,7 @@ def _records(force: ArrayLike, response: ArrayLike) -> tuple[Real, Real]:
     wrong = {"force": np.count_nonzero(~np.isfinite(x)), "response": np.sum(~np.isfinite(y))}
     faults = [f"{name} has {n} non-finite samples, must have 0" for name, n in wrong.items() if n]
     if faults:
-        raise ValueError("; ".join(faults) + "; cut or mend the recording")
+        raise ValueError("; ".join(faults) + "; cut or repair the recording")
     return x, y
 
 

@@ -132,7 +132,7 @@ def checked_functions(
         faults.append("frequency must be finite, >= 0 Hz and increasing; sort the lines")
     wrong = np.count_nonzero(~np.isfinite(functions))
     if wrong:
-        faults.append(f"value has {wrong} non-finite lines, must have 0; cut or mend them")
+        faults.append(f"value has {wrong} non-finite lines, must have 0; cut or repair them")
     elif functions.size:
         peaks = np.abs(functions).max(axis=-1)
         odd = np.flatnonzero((peaks < _SIZES[0]) | (peaks > _SIZES[1])).tolist()

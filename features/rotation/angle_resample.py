@@ -279,7 +279,7 @@ def _check_record(signal: NDArray[Any], phase: Float, points: int) -> None:
         faults.append(f"phase has shape {phase.shape}, must have {signal.shape[-1:]} as x")
     elif not np.all(np.isfinite(signal)):
         wrong = int((~np.isfinite(signal)).sum())
-        faults.append(f"x has {wrong} non-finite samples, must have 0; cut or mend the recording")
+        faults.append(f"x has {wrong} non-finite samples, must have 0; cut or repair the recording")
     if points < 4:
         faults.append(f"points_per_revolution = {points} must be >= 4; 256 keeps 102 orders")
     if faults:

@@ -108,7 +108,7 @@ def _check_tacho(volts: Float, fs: float) -> None:
     if wrong.size:
         raise ValueError(
             f"tacho has {wrong.size} non-finite samples, the first at {wrong[0]}, must have 0; "
-            "cut or mend the recording"
+            "cut or repair the recording"
         )
 
 
@@ -230,7 +230,7 @@ def _check_regular(times: Float, intervals: Float, duration: float) -> None:
         raise ValueError(
             f"ratio of pulse intervals = {jumps[worst]:.3g} at {times[worst + 1]:.6g} s must be < "
             f"{INTERVAL_JUMP}; a pulse is missing or false there, or the shaft stands still: "
-            "mend the pulses, cut it out, or check the tacho"
+            "repair the pulses, cut it out, or check the tacho"
         )
     silence = max(times[0] / intervals[0], (duration - times[-1]) / intervals[-1])
     if silence >= INTERVAL_JUMP:

@@ -219,7 +219,7 @@ def _check_speed_request(
     if x.ndim != 1:
         faults.append(f"x has shape {x.shape}, must be (n_samples,); give one channel")
     if not np.all(np.isfinite(x)):
-        faults.append("x must be finite; cut or mend the recording")
+        faults.append("x must be finite; cut or repair the recording")
     if not 0 < band[0] < band[1] <= 0.4 * fs:
         faults.append(f"band_hz = {band} must increase within 0 … 0.4 fs = {0.4 * fs:.6g} Hz")
     elif length * band[0] < FEWEST_REVOLUTIONS * fs:

@@ -1,4 +1,4 @@
 """One channel at a time: transforms, spectra, statistics, cepstrum, envelope, severity.
 
-Imports nothing else of the package.
+It imports nothing else of the package.
 """

@@ -70,7 +70,7 @@ def _logarithm(lines: ArrayLike) -> Float:
     if power.ndim == 0 or power.shape[-1] < 3:
         raise ValueError(f"lines of shape {power.shape} must be three or more; give a spectrum")
     if not (np.isfinite(power) & (power >= 0)).all():
-        raise ValueError("lines must be finite and >= 0; cut or mend the recording")
+        raise ValueError("lines must be finite and >= 0; cut or repair the recording")
     power[..., 0] = power[..., 1]
     largest = power.max(axis=-1, keepdims=True)
     relative = power / np.where(largest > 0, largest, 1)

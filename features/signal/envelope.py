@@ -88,7 +88,7 @@ def checked_signal(x: ArrayLike, fs: float, *, least: int = 2 * FEWEST_LINES) ->
         faults.append(f"n_samples = {n_samples} must be >= {least}; record longer")
     wrong = signal.size - np.count_nonzero(np.isfinite(signal))
     if wrong:
-        faults.append(f"x has {wrong} non-finite samples, must have 0; cut or mend the recording")
+        faults.append(f"x has {wrong} non-finite samples, must have 0; cut or repair the recording")
     if faults:
         raise ValueError("; ".join(faults))
     return centred(signal)
@@ -501,7 +501,7 @@ def _check_spectrum(place: Float, size: Float) -> None:
             ">= 2; give the spectrum of one channel"
         )
     if not (np.isfinite(size).all() and (size >= 0).all()):
-        raise ValueError("amplitude must be finite and >= 0; mend the recording")
+        raise ValueError("amplitude must be finite and >= 0; repair the recording")
     even = np.arange(place.size) * place[1]
     if not (place[1] > 0 and np.allclose(place, even, rtol=1e-6, atol=0)):
         raise ValueError("frequency must rise evenly from 0; give every line of the spectrum")

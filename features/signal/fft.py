@@ -412,7 +412,7 @@ def fft_mode() -> str:
     mode = os.environ.get("WEARSTATE_FFT") or MODES[0]
     if mode not in MODES:
         raise FFTModeError(
-            f"WEARSTATE_FFT = {mode!r} must be one of {', '.join(MODES)}; mend or unset it"
+            f"WEARSTATE_FFT = {mode!r} must be one of {', '.join(MODES)}; correct or unset it"
         )
     return mode
 

@@ -389,7 +389,7 @@ def _place(
     size = np.asarray(values, dtype=np.float64)
     wrong = size[~((size >= 0) & (size < np.inf))]
     if wrong.size:
-        raise ValueError(f"{name} = {wrong[0]} {unit} must be >= 0 and finite; mend the signal")
+        raise ValueError(f"{name} = {wrong[0]} {unit} must be >= 0 and finite; repair the signal")
     # A printed boundary of 4.5 mm/s need not equal the float 0.0045: compare to six digits.
     edges = np.asarray(boundaries) / scale * (1 + 1e-6)
     return np.asarray(np.searchsorted(edges, size, side="left"))

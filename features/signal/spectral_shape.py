@@ -228,7 +228,7 @@ def noise_floor(
             ">= 8; widen it or record longer"
         )
     if not np.isfinite(power).all():
-        faults.append("lines hold non-finite values, must have 0; cut or mend the recording")
+        faults.append("lines hold non-finite values, must have 0; cut or repair the recording")
     if faults:
         raise ValueError("; ".join(faults))
     quartile = np.quantile(power[..., inside], FLOOR_QUANTILE, axis=-1)

@@ -246,7 +246,7 @@ def band_weights(n_samples: int, fs: float, bands: ArrayLike) -> NDArray[np.floa
                 f"band {low:.6g} … {high:.6g} Hz must rise within 0 … fs / 2 = {fs / 2:.6g} Hz"
                 for low, high in wrong
             )
-            + "; mend or drop it"
+            + "; correct or drop it"
         )
     return _shares(n_samples, fs, tuple((low, high) for low, high in pairs.tolist()))
 

@@ -557,5 +557,5 @@ def entropy(x: ArrayLike) -> Real:
     """
     amplitude = Amplitude(x)
     if not np.isfinite(amplitude.peak).all():
-        raise ValueError("x has non-finite samples, must have 0; cut or mend the recording")
+        raise ValueError("x has non-finite samples, must have 0; cut or repair the recording")
     return amplitude.entropy
