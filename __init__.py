@@ -94,11 +94,11 @@ _HOMES = {
     "train": ".diagnose.workflow.train",
     "train_classes": ".diagnose.workflow.train",
 }
-"""Public name -> module that defines it; the block above tells type checkers the same."""
+"""Public name -> module that defines it; repeats the block above, which is for type checkers."""
 
 __all__ = ["__version__", *_MODULES, *_HOMES]
 
-if not TYPE_CHECKING:  # a type checker would take it that there is every name
+if not TYPE_CHECKING:  # a type checker would assume that every name exists
 
     def __getattr__(name: str) -> "Any":
         """Import the public name on first use."""

@@ -3,7 +3,7 @@
 import sys
 
 if not sys.flags.safe_path:
-    del sys.path[0]  # the current folder, put first by -m: no file there may be run for a module
+    del sys.path[0]  # the current folder, put first by -m: its files must not be imported
 
 from .diagnose.command_line.cli import main
 

@@ -1,7 +1,7 @@
 """Alignment of shaft lines: reactions, influence numbers, bearing moves, jacking, gap and sag.
 
-:func:`align` judges a scene and finds the moves that mend it; the other functions take a line of
-bearings on a beam.
+:func:`align` evaluates a scene and finds the moves that correct it; the other functions take a line
+of bearings on a beam.
 
 Examples
 --------

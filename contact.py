@@ -1,4 +1,4 @@
-"""Contact in joints with clearance: stiffness, damping and restitution, and the wear they cause.
+"""Contact in joints with clearance: stiffness, damping and restitution, and wear.
 
 Examples
 --------

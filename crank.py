@@ -1,4 +1,4 @@
-"""Slider-crank of a reciprocating pump: motion, joint forces, flow, and what slides in its joints.
+"""Slider-crank of a reciprocating pump: motion, joint forces, flow, and sliding in its joints.
 
 Examples
 --------

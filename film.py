@@ -1,7 +1,7 @@
 """Oil films of journal bearings: equilibrium, coefficients, whirl threshold, friction and flow.
 
-:func:`operate` answers in SI for a bearing at a speed, under a load or at a given eccentricity;
-the other functions are non-dimensional, as charts of the literature are.
+:func:`operate` computes in SI a bearing at a speed, under a load or at a given eccentricity;
+the other functions are non-dimensional, like the charts of the literature.
 
 Examples
 --------

@@ -1,6 +1,6 @@
-"""The root of the repository is the package ``wearstate``; the folders below are found, not listed.
+"""The root of the repository is the package ``wearstate``; its folders are found, not listed.
 
-``packages.find`` of pyproject.toml cannot put a name before what it finds.
+``packages.find`` of pyproject.toml cannot put a prefix before the names it finds.
 """
 
 from setuptools import find_packages, setup

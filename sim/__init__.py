@@ -1,1 +1,1 @@
-"""The physics: a scene goes in, a time history comes out."""
+"""Physics: simulators that turn a scene into a time history."""

@@ -1,6 +1,6 @@
-"""Files that appear whole or not at all, each made under a name that no other run uses.
+"""Files that appear whole or not at all, each written first under a unique temporary name.
 
-Of the standard library only.
+Uses the standard library only.
 """
 
 import errno
@@ -12,18 +12,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_NAME_KEPT = 60  # characters; a file system takes 255 byte, of which one character may need four
+_NAME_KEPT = 60  # characters; a file system allows 255 bytes, and a character may take four
 
 
 class OutputError(ValueError):
-    """A finished output may not be put in its place; names it, where it is kept, and the cure."""
+    """A finished output cannot be put in place; the message gives its location and the cure."""
 
 
 def fresh_name(path: Path, ending: str = "tmp") -> Path:
-    """Name beside a file that no other run uses.
+    """Name next to a file that no other run uses.
 
     A run that is killed leaves ``NAME.xxxxxxxx.tmp`` behind: no reader takes it for a recording,
-    no later run stumbles over it, and it may be deleted.
+    it does not disturb later runs, and it may be deleted.
 
     Examples
     --------
@@ -35,19 +35,19 @@ def fresh_name(path: Path, ending: str = "tmp") -> Path:
 
 @contextmanager
 def replacing(path: Path, *, force: bool) -> Iterator[Path]:
-    """Give a fresh name to write a file or folder under, and put that in place at the end.
+    """Provide a temporary name for a file or folder, and move it into place at the end.
 
     Parameters
     ----------
     path : Path
         Output.
     force : bool
-        Replace what is there at the end, also what appeared meanwhile.
+        Replace an existing output, including one that appeared meanwhile.
 
     Yields
     ------
     Path
-        Nothing is there yet. What is written there is removed where the block fails.
+        Unused path. What is written there is removed if the block fails.
 
     Raises
     ------
@@ -68,34 +68,34 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
         yield fresh
         put_in_place(fresh, path, force=force)
     except OutputError:
-        raise  # the work of the run is kept
+        raise  # keep the work of the run
     except BaseException:
         _remove(fresh)
         raise
 
 
 def write_whole(path: Path, content: bytes, *, force: bool) -> None:
-    """Write a file whole, or not at all; see :func:`replacing`."""
+    """Write a file whole or not at all; see :func:`replacing`."""
     with replacing(path, force=force) as fresh:
         fresh.write_bytes(content)
 
 
 def put_in_place(fresh: Path, path: Path, *, force: bool) -> None:
-    """Give a finished file or folder its name; what had it before is lost at no instant.
+    """Rename a finished file or folder; an existing one is replaced without a gap.
 
     Parameters
     ----------
     fresh : Path
-        Beside `path`.
+        Next to `path`.
     path : Path
-        Its name from now on.
+        Final name.
     force : bool
-        Replace what is there. A folder is put aside first and removed last.
+        Replace an existing output. A folder is first renamed and removed at the end.
 
     Raises
     ------
     OutputError
-        There is something and `force` is not given; `fresh` stays.
+        The output exists and `force` is not given; `fresh` stays.
     """
     if fresh.is_file():
         with fresh.open("r+b") as handle:
@@ -111,7 +111,7 @@ def put_in_place(fresh: Path, path: Path, *, force: bool) -> None:
 def _put_new(fresh: Path, path: Path) -> None:
     try:
         if fresh.is_dir():
-            os.rename(fresh, path)  # an empty folder gives way
+            os.rename(fresh, path)  # replaces an empty folder
             return
         _link(fresh, path)
         fresh.unlink(missing_ok=True)
@@ -119,13 +119,13 @@ def _put_new(fresh: Path, path: Path) -> None:
         if error.errno not in (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR):
             raise
         raise OutputError(
-            f"{path} has appeared during the run and is not replaced; what was made is kept as "
+            f"{path} has appeared during the run and is not replaced; the result is kept as "
             f"{fresh.name}: rename it, or use force from the start"
         ) from None
 
 
 def _link(fresh: Path, path: Path) -> None:
-    """Second name of a file, only where there is none: renaming would replace."""
+    """Add a second name to a file unless it is taken: renaming would replace."""
     try:
         os.link(fresh, path)
     except FileExistsError:
@@ -154,13 +154,13 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-# --- content that tells whether it is whole -------------------------------------------------------
+# --- content that shows whether it is whole -------------------------------------------------------
 
 _DIGEST = hashlib.sha256().digest_size
 
 
 def sealed(content: bytes) -> bytes:
-    """Content behind its SHA-256.
+    """Content preceded by its SHA-256.
 
     Examples
     --------
@@ -171,6 +171,6 @@ def sealed(content: bytes) -> bytes:
 
 
 def unsealed(stored: bytes) -> bytes | None:
-    """Content that :func:`sealed` was given; None where it is cut or altered."""
+    """Content of a :func:`sealed` text; None if it is cut or altered."""
     content = stored[_DIGEST:]
     return content if sealed(content) == stored else None

@@ -1,4 +1,4 @@
-"""Short texts of results that hold arrays."""
+"""Short texts for results that hold arrays."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 _FEW = 6
-"""Numbers of an array or a tuple that are told one by one."""
+"""Numbers of an array or a tuple up to which all are listed."""
 _LONGEST = 40
-"""Characters of a text."""
+"""Longest text in characters."""
 
 
 def brief(*names: str) -> Callable[[Any], str]:
-    """A ``__repr__`` that tells these attributes in one line; without any, all fields.
+    """``__repr__`` that shows the given attributes in one line; without any, all fields.
 
     Parameters
     ----------
@@ -25,8 +25,8 @@ def brief(*names: str) -> Callable[[Any], str]:
     Returns
     -------
     callable
-        Numbers have four digits; of arrays, sequences and other objects kind and size are told;
-        what is None or empty is left out.
+        Numbers have four digits; arrays, sequences and other objects are shown by kind and size;
+        None and empty values are omitted.
 
     Examples
     --------
@@ -40,16 +40,16 @@ def brief(*names: str) -> Callable[[Any], str]:
     <Mode frequency=12.35, shape=array(2, 60)>
     """
 
-    def told(self: Any) -> str:
+    def summary(self: Any) -> str:
         chosen = names or [field.name for field in fields(self) if field.repr]
         words = [f"{name}={text}" for name in chosen if (text := short(getattr(self, name)))]
         return f"<{type(self).__name__} {', '.join(words)}>"
 
-    return told
+    return summary
 
 
 def short(value: Any) -> str:
-    """A value in a few words; empty where it is None or empty.
+    """A value in a few words; empty if it is None or empty.
 
     Parameters
     ----------

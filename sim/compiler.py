@@ -1,12 +1,12 @@
-"""How kernels are compiled: whole where Python calls them, as parts where other kernels do.
+"""Compilation of kernels: complete if called from Python, as parts if called by other kernels.
 
-Left to itself, numba makes every function that another one calls a program of its own first, with
+By default numba compiles every function that another one calls into a complete program, with
 wrappers for Python, all optimisations and machine code, and the caller optimises the same code once
-more: ten times at a depth of ten. Here a callee is a *part*, types and code as they were written
-down, kept for all kernels that call it. Only what Python calls is optimised and becomes machine
-code, once, with its parts in it: at the same speed, with the same bytes, in half the time.
+more: ten times at a depth of ten. Here a callee is a *part*: types and unoptimised code, kept for
+all kernels that call it. Only what Python calls is optimised and translated to machine
+code, once, including its parts: at the same speed, with the same bytes, in half the time.
 
-Built on numba's own places for this: a dispatcher, a compiler with another last pass, a library.
+It uses numba's own extension points: a dispatcher, a compiler with another last pass, a library.
 """
 
 import gc
@@ -29,32 +29,32 @@ _NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 class Store(Protocol):
-    """Where parts are kept from one process to the next."""
+    """Storage of parts between processes."""
 
     def load(self, name: str) -> Any:
-        """What was kept under a name; None where there is nothing whole."""
+        """Content stored under a name; None if there is none that is whole."""
 
     def save(self, name: str, content: Any) -> None:
-        """Keep it, where that is possible."""
+        """Store content, if possible."""
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function that other ones call as a part of theirs.
+    """A compiled function that other kernels call as a part of theirs.
 
     Parameters
     ----------
     py_func : callable
-        What it computes.
+        Python function that it compiles.
     locals : dict, optional
-        Types of local variables, as numba's dispatcher has them.
+        Types of local variables, as in numba's dispatcher.
     targetoptions : dict
         Options of ``numba.njit``.
     pipeline_class : type, optional
-        Compiler; that of whole kernels.
+        Compiler; by default that of whole kernels.
     store : Store, optional
-        For the part; without it every process makes it anew.
-    apart : bool
-        Records and arrays among its arguments do not overlap; nobody checks that.
+        Storage for the part; without it every process compiles it again.
+    noalias : bool
+        Records and arrays among its arguments do not overlap; this is not checked.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         targetoptions: dict[str, Any] | None = None,
         pipeline_class: type | None = None,
         store: Store | None = None,
-        apart: bool = False,
+        noalias: bool = False,
     ) -> None:
         options = {"nopython": True, "boundscheck": None, **(targetoptions or {})}
         variables = locals or {}
@@ -75,7 +75,10 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             pipeline_class or _WholeCompiler,
         )
         self.part = _Part(
-            py_func, variables, options | _NO_WRAPPERS, _ApartCompiler if apart else _PartCompiler
+            py_func,
+            variables,
+            options | _NO_WRAPPERS,
+            _NoAliasCompiler if noalias else _PartCompiler,
         )
         if store is not None:
             self.part._cache = _Kept(py_func, store)
@@ -95,19 +98,19 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
 
 
 class _Part(CPUDispatcher):  # type: ignore[misc]
-    """A function as other kernels call it: nothing that Python could call."""
+    """A function as other kernels call it, not callable from Python."""
 
     def add_overload(self, cres: Any) -> None:
         self.overloads[tuple(cres.signature.args)] = cres
 
 
 class _Key:
-    """Stands for the code of a part where numba looks it up."""
+    """Placeholder for the code of a part in numba's look-ups."""
 
 
 @contextmanager
 def _no_garbage_collected() -> Iterator[None]:
-    """The compiler makes millions of objects that stay till it ends: an eighth of its time."""
+    """Pause garbage collection, an eighth of the compiler's time, as its objects all live on."""
     if not gc.isenabled():
         yield
         return
@@ -119,7 +122,7 @@ def _no_garbage_collected() -> Iterator[None]:
 
 
 def _address(function: Any) -> tuple[str, str] | None:
-    """Module and name under which a kernel of this function is found, where it is."""
+    """Module and name under which a function's kernel can be imported, if it can."""
     kernel: Any = None
     try:
         kernel = importlib.import_module(function.__module__)
@@ -133,10 +136,10 @@ def _address(function: Any) -> tuple[str, str] | None:
 
 
 def lasting(types: Any, function: Any) -> bool:
-    """Whether the types of a function's arguments are described alike in every process.
+    """Whether the types of a function's arguments have the same description in every process.
 
-    Those of a named tuple are described by its name alone. Of another copy of this package, under
-    another name, they would be taken for the function's own.
+    A named tuple is described by its name alone. One of another copy of this package, under
+    another name, would be mistaken for the function's own.
     """
     homes = {_package(function), __name__.partition(".")[0]}
     return " at 0x" not in str(types) and homes.issuperset(map(_package, _classes(types)))
@@ -157,10 +160,10 @@ def _classes(types: Any) -> Iterator[type]:
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code of one part alone, for the linker.
+    """Code of a single part, for the linker.
 
-    `calls` are the libraries of what it calls, or where these are found; `origin` is where the part
-    itself is found: module, name and types of arguments, None of what no later process finds.
+    `calls` are the libraries of its callees, or their origins; `origin` is that of the part
+    itself: module, name and types of arguments; None if no later process can find it.
     """
 
     _shared_module: Any
@@ -171,17 +174,17 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         self.kept: tuple[bytes, list[Any]] | None = None
 
     def finalize(self) -> None:
-        """Nothing: whole kernels link, optimise and translate."""
+        """Do nothing: whole kernels link, optimise and translate."""
         self._finalized = True
 
     def calls(self) -> list[Any]:
-        """Libraries of what it calls."""
+        """Libraries of its callees."""
         if self.kept is None:
             return list(dict.fromkeys(self._linking_libraries))
         return [_called(self._codegen, each) for each in self.kept[1]]
 
     def content(self) -> tuple[bytes, list[Any]] | None:
-        """What a later process needs; None where that cannot be told."""
+        """Data for a later process; None if it cannot be identified."""
         calls: list[Any] = []
         for each in self.calls():
             if not isinstance(each, _PartLibrary):
@@ -198,12 +201,12 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
         return super()._get_module_for_linking()
 
     def keep(self, content: tuple[bytes, list[Any]]) -> None:
-        """Be what another process has made."""
+        """Take over the content made by another process."""
         self.kept, self._finalized = content, True
 
 
 def _called(codegen: Any, where: Any) -> Any:
-    """Library of what a kept part calls: code of numba's own, or another part."""
+    """Library of a stored part's callee: numba's own code, or another part."""
     if isinstance(where, bytes):
         library = _PartLibrary(codegen, "callee")
         library.keep((where, []))
@@ -217,7 +220,7 @@ def _called(codegen: Any, where: Any) -> Any:
 
 
 class _WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A kernel with all its parts, each linked after those that call it: else it is left out."""
+    """A kernel with all its parts, each linked after its callers, else the linker drops it."""
 
     _linking_libraries: Any
 
@@ -243,7 +246,7 @@ class _WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == binding.Linkage.linkonce_odr:
-                function.linkage = binding.Linkage.internal  # no other kernel's takes its place
+                function.linkage = binding.Linkage.internal  # not replaceable by another kernel's
         super()._optimize_final_module()
 
     def _verify_declare_only_symbols(self) -> None:
@@ -259,7 +262,7 @@ class _WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _PartLowering(NativeLowering):  # type: ignore[misc]
-    """Code of a part, neither optimised nor translated."""
+    """Code of a part, neither optimised nor translated to machine code."""
 
     _name = "part_lowering"
 
@@ -269,7 +272,7 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
         address = _address(function) if lasting(types, function) else None
         origin = None if address is None else (*address, types)
         state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname, origin)
-        if origin is not None:  # a name that every process gives it
+        if origin is not None:  # the same name in every process
             state.targetctx = state.targetctx.subtarget(mangler=_lasting_name)
         state.flags.no_compile = True
         super().run_pass(state)
@@ -280,9 +283,9 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
 
 
 def _lasting_name(name: str, types: Any, *, abi_tags: Any = (), **_: Any) -> str:
-    """Name of a function for the linker: numba's counts what this process has compiled."""
-    told = hashlib.sha256(f"{types} {abi_tags}".encode()).hexdigest()[:32]
-    mangled: str = itanium_mangler.mangle(name, (), abi_tags=(told,))
+    """Linker name of a function, the same in every process; numba's counts compilations."""
+    digest = hashlib.sha256(f"{types} {abi_tags}".encode()).hexdigest()[:32]
+    mangled: str = itanium_mangler.mangle(name, (), abi_tags=(digest,))
     return mangled
 
 
@@ -300,7 +303,7 @@ class _WholeLowering(NativeLowering):  # type: ignore[misc]
 
 
 class _WholeCompiler(CompilerBase):  # type: ignore[misc]
-    """numba's compiler with another way to machine code."""
+    """numba's compiler with a different final pass."""
 
     lowering: Any = _WholeLowering
 
@@ -318,8 +321,8 @@ class _PartCompiler(_WholeCompiler):
     lowering = _PartLowering
 
 
-class _ApartCompiler(_PartCompiler):
-    """Code of a part that never reads through one argument what it wrote through another."""
+class _NoAliasCompiler(_PartCompiler):
+    """Code of a part whose arguments do not overlap in memory."""
 
     def define_pipelines(self) -> list[Any]:
         self.state.flags.noalias = True
@@ -327,13 +330,13 @@ class _ApartCompiler(_PartCompiler):
 
 
 class _Kept:
-    """Parts of one function in a store, in place of numba's cache."""
+    """Stored parts of one function, in place of numba's cache."""
 
     def __init__(self, function: Any, store: Store) -> None:
         self._function, self._store = function, store
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Part for the types of its arguments, where one is kept."""
+        """Stored part for the types of its arguments, if there is one."""
         types, _ = sigutils.normalize_signature(sig)
         name = self._name(types, target_context.codegen())
         found = None if name is None else self._store.load(name)
@@ -358,13 +361,13 @@ class _Kept:
         )
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a part."""
+        """Store a part."""
         types, _ = sigutils.normalize_signature(sig)
         name = self._name(types, data.library.codegen)
         content = None if data.reload_init else data.library.content()
         if name is None or content is None:
             return
-        data.fndesc.typemap = data.fndesc.calltypes = None  # of the compiler alone
+        data.fndesc.typemap = data.fndesc.calltypes = None  # needed by the compiler only
         self._store.save(name, (data.fndesc, data.signature, content))
 
     def _name(self, types: Any, codegen: Any) -> str | None:

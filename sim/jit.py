@@ -1,10 +1,10 @@
 """Compiled kernels whose cache cannot go stale.
 
-numba keys a cached kernel by its own file only, so a change in a callee of another file would go
-unnoticed. Here the cache folder carries a hash of every source of ``sim`` that a kernel can see.
-What is cut or altered there is compiled anew and replaced; a folder that cannot be written costs
-compiling at every start, and one warning. The hash says all of a kernel of ``sim``, so that
-installations of the same sources share what one of them compiled.
+numba keys a cached kernel by its own file only, so it would miss a change in a callee of another
+file. Here the cache folder's name is a hash of every source of ``sim`` that a kernel can see.
+Damaged files are compiled again and replaced; if the folder is not writable, every start compiles,
+with one warning. The hash identifies a kernel of ``sim`` completely, so that
+installations of the same sources share compiled kernels.
 """
 
 import ast
@@ -28,21 +28,21 @@ from numba.core.caching import FunctionCache
 from .atomic import sealed, unsealed, write_whole
 from .compiler import Kernel, lasting
 
-# No freedom is given to the compiler, not even contraction to fused multiply-add, which it would
-# use here and not there: a record has the same bytes alone and beside others. Forced inlining
-# halves the time of a crank step: its parameters would be copied at every call. Without numba's
-# runtime a kernel allocates nothing and counts no references, which doubles its speed again.
+# The compiler has no freedom, not even contraction to fused multiply-add, which it would use in
+# some places only: a record has the same bytes alone and next to others. Forced inlining halves
+# the time of a crank step, whose parameters would be copied at every call. Without numba's runtime
+# a kernel allocates nothing and counts no references, which doubles its speed again.
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "forceinline": True,
     "_nrt": False,
 }
 
-# Statements, then parsed by themselves: whole files would cost every start a quarter of a second.
-# tests/test_layers.py holds what is found here against the syntax trees of whole files.
+# Only import statements are parsed: whole files would cost every start a quarter of a second.
+# tests/test_layers.py compares the result with the syntax trees of whole files.
 _IMPORT = re.compile(r"^[ \t]*(from \.+[\w.]* import (?:\([^)]*\)|.*))", re.MULTILINE)
 
-_dumps: Any = serialize.dumps  # as numba packs: also what only its own unpickler knows
+_dumps: Any = serialize.dumps  # numba's own pickler: also for what only its unpickler can read
 
 _LOG = logging.getLogger(__name__)
 
@@ -51,12 +51,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 @cache
 def cache_folder() -> Path | None:
-    """Folder of the compiled kernels of these sources, or None where none is writable.
+    """Folder of the compiled kernels of these sources, or None if none is writable.
 
     The base is ``$WEARSTATE_CACHE``, else ``$XDG_CACHE_HOME/wearstate``, else
-    ``~/.cache/wearstate``. Folders of other sources that are older are removed.
+    ``~/.cache/wearstate``. Older folders of other sources are removed.
     """
-    # kept code names its modules: a copy that is imported by another name has a folder of its own
+    # stored code names its modules: a copy imported by another name has its own folder
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {__package__}".encode())
     for source in kernel_sources(Path(__file__).parent):
         digest.update(source.read_bytes())
@@ -75,25 +75,25 @@ def cache_folder() -> Path | None:
 
 @cache
 def _warn_unkept(reason: str) -> None:
-    """Once for each reason."""
+    """Warn once for each reason."""
     _LOG.warning(
-        "compiled kernels cannot be kept (%s), so that every start compiles: make room and rights, "
-        "or name a folder in WEARSTATE_CACHE",
+        "compiled kernels cannot be kept (%s), so that every start compiles: free space, allow "
+        "writing, or name a folder in WEARSTATE_CACHE",
         reason,
     )
 
 
 @cache
 def _warn_damaged(folder: Path) -> None:
-    """Once for each folder."""
+    """Warn once for each folder."""
     _LOG.warning("the kernel cache %s is damaged: kernels are compiled again and replaced", folder)
 
 
 def kernel_sources(folder: Path) -> list[Path]:
-    """Files of a package that hold kernels, in it or below, and all that they import from it.
+    """Files of a package that hold kernels, and all that they import from it.
 
-    A kernel takes its callees and constants from there; other files may change freely. Sorted by
-    name below `folder`, so that the order is the same wherever the package lies.
+    These hold a kernel's callees and constants; other files may change freely. Sorted by name
+    below `folder`, so that the order does not depend on the location of the package.
 
     Examples
     --------
@@ -114,7 +114,7 @@ def kernel_sources(folder: Path) -> list[Path]:
 
 
 def _imported_from(files: set[Path], path: Path) -> list[Path]:
-    """Those of some files that the relative imports of one of them name."""
+    """Files that the relative imports of one of them name."""
     text = path.read_text(encoding="utf-8")
     statements = ast.parse("\n".join(_IMPORT.findall(text))).body
     return [
@@ -127,7 +127,7 @@ def _imported_from(files: set[Path], path: Path) -> list[Path]:
 
 
 def _named_files(statement: ast.ImportFrom, path: Path) -> list[Path]:
-    """Files that one relative import may mean: a module, or modules of a package."""
+    """Files that a relative import may refer to: a module, or modules of a package."""
     base = path.parents[statement.level - 1].joinpath(*(statement.module or "").split("."))
     modules = [base / alias.name for alias in statement.names]
     return [each.parent / f"{each.name}.py" for each in (base, *modules)]
@@ -148,10 +148,10 @@ def _forget_all_but_newest(base: Path, keep: int = 4) -> None:
 
 
 class _SealedFiles:
-    """Files of one kernel in place of numba's own: damage is a miss, and the next `save` mends it.
+    """Cache files of one kernel: damage counts as a miss and is replaced by the next `save`.
 
-    The index is behind its SHA-256; a data file is named by that of its content, so that two
-    processes which write at once cannot mix theirs up.
+    The index is preceded by its SHA-256; a data file is named by the hash of its content, so that
+    two processes writing at once cannot mix theirs up.
     """
 
     def __init__(self, function: Any, folder: Path, stem: str, stamp: Any) -> None:
@@ -159,7 +159,7 @@ class _SealedFiles:
         self._index = folder / f"{stem}.nbi"
 
     def load(self, key: Any) -> Any:
-        """Compiled code of a signature; None where there is none that is whole."""
+        """Compiled code of a signature; None if there is none that is whole."""
         name = self._load_index().get(key)
         if name is None:
             return None
@@ -170,7 +170,7 @@ class _SealedFiles:
         return pickle.loads(content)
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep compiled code, where that is possible."""
+        """Store compiled code, if possible."""
         if not lasting(key[0], self._function):  # a key begins with the types of the arguments
             return
         content: bytes = _dumps(data)
@@ -208,13 +208,13 @@ class _SealedFiles:
 
 
 class _SealedParts:
-    """Parts of one kernel, each in a file behind its SHA-256: damage is a miss, and mended."""
+    """Parts of one kernel, each in a file preceded by its SHA-256; damage counts as a miss."""
 
     def __init__(self, folder: Path, stem: str, stamp: Any) -> None:
         self._folder, self._stem, self._stamp = folder, stem, stamp
 
     def load(self, name: str) -> Any:
-        """What was kept under a name of the same source; None where there is nothing whole."""
+        """Content stored under a name by the same source; None if there is none that is whole."""
         try:
             content = unsealed(self._path(name).read_bytes())
         except FileNotFoundError:
@@ -228,7 +228,7 @@ class _SealedParts:
         return found if stamp == self._stamp else None
 
     def save(self, name: str, content: Any) -> None:
-        """Keep it, where that is possible."""
+        """Store content, if possible."""
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             write_whole(self._path(name), sealed(_dumps((self._stamp, content))), force=True)
@@ -245,32 +245,32 @@ def kernel(function: Function) -> Function:
 
 
 def subroutine(function: Function) -> Function:
-    """As :func:`kernel`, but called where it is used: compiled once, however many call it."""
+    """Compile like :func:`kernel`, but as a call instead of inline, once for all callers."""
     return _compiled(function, _OPTIONS | {"forceinline": False})
 
 
-def kernel_apart(function: Function) -> Function:
-    """As :func:`kernel`, of a function whose records and arrays do not overlap in memory.
+def kernel_noalias(function: Function) -> Function:
+    """Compile like :func:`kernel`, for records and arrays that do not overlap in memory.
 
-    Its loops lie in vectors without a check, at every call, of what might overlap.
+    Its loops are vectorised without a run-time overlap check at every call.
     """
-    return _compiled(function, _OPTIONS, apart=True)
+    return _compiled(function, _OPTIONS, noalias=True)
 
 
-def _compiled(function: Function, options: dict[str, Any], apart: bool = False) -> Function:
+def _compiled(function: Function, options: dict[str, Any], noalias: bool = False) -> Function:
     folder = cache_folder()
     if folder is None:
-        return Kernel(function, targetoptions=options, apart=apart)
+        return Kernel(function, targetoptions=options, noalias=noalias)
     settings: Any = config
     before = settings.CACHE_DIR
-    settings.CACHE_DIR = str(folder)  # read by numba at once, restored at once
+    settings.CACHE_DIR = str(folder)  # numba reads it immediately; restored below
     try:
         files: Any = FunctionCache(function)
     finally:
         settings.CACHE_DIR = before
     place = Path(files.cache_path)
-    if not place.is_relative_to(folder):  # numba found it unwritable and took another
-        return Kernel(function, targetoptions=options, apart=apart)
+    if not place.is_relative_to(folder):  # not writable for numba, which chose another folder
+        return Kernel(function, targetoptions=options, noalias=noalias)
     names = files._impl
     stamp = names.locator.get_source_stamp()
     source, here = Path(function.__code__.co_filename), Path(__file__).parent
@@ -281,19 +281,19 @@ def _compiled(function: Function, options: dict[str, Any], apart: bool = False) 
         function,
         targetoptions=options,
         store=_SealedParts(place, names.filename_base, stamp),
-        apart=apart,
+        noalias=noalias,
     )
     compiled._cache = files
     return compiled  # type: ignore[no-any-return]
 
 
 NEAR = 0.785
-"""Angle up to which :func:`near_sine_cosine` is :func:`sine_cosine`, less than pi/4 [rad]."""
+"""Angle up to which :func:`near_sine_cosine` equals :func:`sine_cosine`, less than pi/4 [rad]."""
 
 
 @kernel
 def near_sine_cosine(r: float) -> tuple[float, float]:
-    """Sine and cosine of an angle of pi/4 at most [rad]."""
+    """Sine and cosine of an angle of at most pi/4 [rad]."""
     z = r * r
     s = 1.58969099521155010221e-10 * z - 2.50507602534068634195e-08
     s = (s * z + 2.75573137070700676789e-06) * z - 1.98412698298579493134e-04
@@ -308,7 +308,7 @@ def near_sine_cosine(r: float) -> tuple[float, float]:
 
 @kernel
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine of one angle together [rad], for the inner loops.
+    """Sine and cosine of an angle [rad], computed together for inner loops.
 
     Range reduction by a two-part pi/2 and the minimax polynomials of the Cephes library on
     [-pi/4, pi/4]: within 4e-16 of libm for angles up to 1e4 rad (tested), at 0.4 of its time.
@@ -317,19 +317,19 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     r = angle - quarter * 1.5707963267341256
     r -= quarter * 6.077100506506192e-11
     sine, cosine = near_sine_cosine(r)
-    turn = quarter - 4.0 * np.floor(0.25 * quarter)  # 0 to 3, chosen rather than branched upon
+    turn = quarter - 4.0 * np.floor(0.25 * quarter)  # 0 to 3, selected without branching
     odd = turn == 1.0 or turn == 3.0
     first, second = cosine if odd else sine, sine if odd else cosine
     return (-first if turn >= 2.0 else first), (-second if 0.5 < turn < 2.5 else second)
 
 
-_STEEP = 0.66  # tangent from which on the arc tangent is taken less pi/4
-_LESS = 6.123233995736766e-17  # of pi/2, that its double lacks
+_STEEP = 0.66  # tangent from which the arc tangent is reduced by pi/4
+_LESS = 6.123233995736766e-17  # missing from the double of pi/2
 
 
 @kernel
 def half_turn_angle(along: float, across: float) -> float:
-    """Angle of (along, across) for across >= 0, in [0, pi] [rad], without a branch or a call.
+    """Angle of (along, across) for across >= 0, in [0, pi] [rad], without branch or call.
 
     Within 4e-16 of the library's arc tangent (tested): range reduction and rational function of the
     Cephes library.
@@ -363,24 +363,24 @@ def _bits(x: float) -> Any:
 
 
 @kernel
-def _of_bits(bits: Any) -> Any:
+def _from_bits(bits: Any) -> Any:
     return np.int64(bits).view(np.float64)
 
 
 @kernel
 def power(x: float, exponent: float) -> float:
-    """Power of a positive number by an exponent between -1 and 1, without a branch or a call.
+    """Power of a positive number for an exponent between -1 and 1, without branch or call.
 
-    NaN of 0, of negative numbers, infinity and NaN.
+    NaN for 0, negative numbers, infinity and NaN.
 
-    So that many lie side by side in vectors, at a third of the time of the library's. Six in seven
-    have its very bits, others are off by 1 ulp, four in a thousand by 2 (tested): the logarithm
+    Vectorised, it takes a third of the library's time. Six of seven results are identical to the
+    library's, others are off by 1 ulp, four in a thousand by 2 (tested): the logarithm
     after fdlibm's ``e_log.c``, kept in two parts as far as its product with the exponent needs it,
     and the series of the exponential.
     """
     bits = _bits(x)
     binary = (bits - _ROOT_HALF) >> 52
-    f = _of_bits(bits - (binary << 52)) - 1.0  # from sqrt(1/2) to sqrt(2), less one
+    f = _from_bits(bits - (binary << 52)) - 1.0  # from sqrt(1/2) to sqrt(2), less one
     s = f / (2.0 + f)
     z = s * s
     r = 1.479819860511658591e-01 * z + 1.531383769920937332e-01
@@ -392,16 +392,16 @@ def power(x: float, exponent: float) -> float:
     whole, part = twos * _LN2_HIGH, f - (half - s * (half + z * r)) + twos * _LN2_LOW
     logarithm = whole + part
     rest = part - (logarithm - whole)
-    l_high = _of_bits(_bits(logarithm) & _UPPER_HALF)
-    e_high = _of_bits(_bits(exponent) & _UPPER_HALF)
+    l_high = _from_bits(_bits(logarithm) & _UPPER_HALF)
+    e_high = _from_bits(_bits(exponent) & _UPPER_HALF)
     shift = np.floor(exponent * logarithm * 1.4426950408889634 + 0.5)
     low = e_high * (logarithm - l_high) + (exponent - e_high) * logarithm + exponent * rest
-    y = (e_high * l_high - shift * _LN2_HIGH) + (low - shift * _LN2_LOW)  # 0.35 at most
+    y = (e_high * l_high - shift * _LN2_HIGH) + (low - shift * _LN2_LOW)  # at most 0.35
     y2 = y * y
     y4 = y2 * y2
     early = 0.5 + y * (1.0 / 6.0) + (1.0 / 24.0 + y * (1.0 / 120.0)) * y2
     middle = 1.0 / 720.0 + y * (1.0 / 5040.0) + (1.0 / 40320.0 + y * (1.0 / 362880.0)) * y2
     late = 1.0 / 3628800.0 + y * (1.0 / 39916800.0) + y2 * (1.0 / 479001600.0)
     grown = 1.0 + (y + y2 * (early + middle * y4 + late * (y4 * y4)))
-    found: float = grown * _of_bits((np.int64(shift) + 1023) << 52)
-    return found if 0.0 < x < np.inf else np.nan  # of other bits it would be some number
+    found: float = grown * _from_bits((np.int64(shift) + 1023) << 52)
+    return found if 0.0 < x < np.inf else np.nan  # other bits would give an arbitrary number

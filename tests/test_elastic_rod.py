@@ -33,7 +33,7 @@ def elastic(scene="bilge-pump", **changes):
 
 
 def run(scene, *, step, n_steps, angle=0.0, speed=None, inertia=0.0, flex=None):
-    t, start = tables.begun(scene, step, angle)
+    t, start = tables.tables_and_start(scene, step, angle)
     if inertia:  # a crank that turns freely
         t = without_loss(t)._replace(machine=t.machine._replace(inverse_inertia=1 / inertia))
     found = run_mechanism(
@@ -140,7 +140,7 @@ FLYING = {
 def test_accelerations_are_those_of_the_rods_mass_points(touching):
     """Lagrange's equations of 4,002 mass points, by differences; the pin flies or rubs."""
     scene = elastic(**LOSSLESS | NO_PRESSURE | FLYING)
-    t, start = tables.begun(scene, 1e-6, 0.4)
+    t, start = tables.tables_and_start(scene, 1e-6, 0.4)
     w = scratch(1, 0, 1)
     w.crank[0, ANGLE], w.crank[0, SPEED] = 0.4, 3.0
     state = np.array([*start.bodies[0, :3], 3e-4, -2e-3])

@@ -79,7 +79,7 @@ def test_a_rung_key_tells_assumption_validity_cost_and_reference():
     text = run("scene", "explain", "pump.pressure.rung").stdout
     for words in (
         "incompressible liquid: energy balance of the lines",
-        "while the liquid's pressure stays above that of its vapour",
+        "while the liquid stays above its vapour pressure",
         "350 ns",
         "Westphal 1893",
         "both lines and valves, pressure.dead_volume",

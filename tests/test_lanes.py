@@ -46,7 +46,7 @@ def same(one, other):
 def test_the_drawn_records_are_of_every_kind(drawn):
     """Else the tests below would compare less than they say."""
     kinds = {lane_kind(scene) for scene, _ in drawn}
-    plays = {(kind.wrist, kind.guide, kind.breathing) for kind in kinds}
+    plays = {(kind.wrist, kind.guide, kind.chambers) for kind in kinds}
     assert plays == set(product((False, True), repeat=3))
     assert {(kind.throws, kind.oil) for kind in kinds} == {(1, DRY)}
     assert {kind.yields for kind in kinds} == {False, True}
@@ -141,7 +141,7 @@ def test_throws_lie_in_lanes_beside_each_other(changes):
     ]
     throws = len(jobs[0][0].throws)
     assert lane_kind(jobs[0][0]).throws == throws > 1
-    assert lane_kind(jobs[0][0]).beside < len(jobs)
+    assert lane_kind(jobs[0][0]).records < len(jobs)
     found = dict(simulate_many(jobs))
     for n, (scene, seed) in enumerate(jobs):
         own = simulate(scene, seed=seed, raise_on_failure=False)
@@ -170,7 +170,7 @@ def test_pins_in_oil_have_the_bytes_of_each_alone(oiled):
     """Starved films with touching peaks, flooded ones on a map; with chambers and with play."""
     kinds = {lane_kind(scene) for scene, _ in oiled}
     assert {kind.oil for kind in kinds} == {SHORT_FILM, MAPPED_FILM}
-    assert {kind.breathing for kind in kinds} == {kind.guide for kind in kinds} == {False, True}
+    assert {kind.chambers for kind in kinds} == {kind.guide for kind in kinds} == {False, True}
     found = dict(simulate_many(oiled))
     own = [simulate(scene, seed=seed, raise_on_failure=False) for scene, seed in oiled]
     assert [n for n in range(N) if not same(found[n], own[n])] == []

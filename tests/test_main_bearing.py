@@ -39,7 +39,7 @@ def worn(scene="bilge-pump", **changes):
 
 
 def run(scene, *, step, n_steps, inertia=0.0, angle=0.3, journal=None, casing=None):
-    t, start = tables.begun(scene, step, angle)
+    t, start = tables.tables_and_start(scene, step, angle)
     if inertia:  # a crank that turns freely
         t = t._replace(machine=t.machine._replace(inverse_inertia=1 / inertia))
     found = run_mechanism(

@@ -19,7 +19,7 @@ from wearstate.sim.pump.scene_run import run_scene
 from wearstate.sim.pump.validity import limits, pump_step
 from wearstate.sim.pump_lanes.lanes import lane_kind
 from wearstate.sim.pump_setup.joints import hydraulics_of
-from wearstate.sim.pump_setup.tables import begun, lines_of
+from wearstate.sim.pump_setup.tables import lines_of, tables_and_start
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump_hydraulics import (
     STANDARD_ATMOSPHERE,
@@ -325,7 +325,7 @@ def test_a_pump_draws_from_its_lines_what_they_give():
     scene = pump("lumped-lines", DAMPED | {"pressure.suction_line.minor_loss": 30.0})
     lines = lines_of(scene, STEP)
     assert lines is not None
-    t, start = begun(scene, STEP, 0.0)
+    t, start = tables_and_start(scene, STEP, 0.0)
     per_turn = round(1 / scene.drive.speed / STEP)
     run = run_mechanism(
         t, **start._asdict(), lines=lines, step=STEP, n_steps=10 * per_turn, keep_states=False

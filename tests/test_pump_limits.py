@@ -128,7 +128,7 @@ BEFORE_THE_RUN = {
     "column torn by knocks": (
         Status.VAPOUR,
         pump(HEADS, crank_pin(diametral_clearance="0.4 mm")),
-        r"pressure: the knocks pull the liquid down to -.* Pa at its lowest, must be >= .* Pa "
+        r"pressure: the knocks pull the liquid down to -.* Pa at the lowest, must be >= .* Pa "
         r"gauge; set pressure\.rung = 'chamber', or pressure\.flow = 'two-harmonic', .*, shorten",
     ),
     "column of one throw torn by knocks": (
@@ -144,7 +144,7 @@ BEFORE_THE_RUN = {
     "column torn": (
         Status.VAPOUR,
         pump(HEADS, {"pressure.suction_line": {"length": "15 m"}}),
-        r"pressure: the piston needs -.* Pa at its lowest, must be >= .* Pa gauge; set "
+        r"pressure: the piston needs -.* Pa at the lowest, must be >= .* Pa gauge; set "
         r"pressure\.rung = 'chamber', shorten pressure\.suction_line\.length, or lower the speed",
     ),
 }
@@ -272,7 +272,7 @@ GOOD = {
     "guide": pump(GUIDE),
     "all joints": pump(WRIST, GUIDE),
     "heads": pump(HEADS, crank_pin(rung="ideal")),
-    "heads, whose flow feels no knocks": pump(HEADS, {"pressure.flow": "two-harmonic"}),
+    "heads, whose flow ignores knocks": pump(HEADS, {"pressure.flow": "two-harmonic"}),
     "chamber": pump(CHAMBER),
     "motor": pump(MOTOR),
     "triplex": pump({"throws": [{"phase": f"{angle} deg"} for angle in (0, 120, 240)]}),

@@ -188,7 +188,7 @@ def test_the_command_tells_peaks_as_json(tmp_path):
     assert 200 < peaks[0]["frequency_hz"] < 330
     assert found["high_hz"] == 450
     error = run("journal-bearing", code=2).stderr
-    assert "machine = 'journal-bearing' has no transfer function here" in error
+    assert "machine = 'journal-bearing' has no transfer function" in error
     error = run("bilge-pump", "--low", 20_000, code=2).stderr
     assert "low = 20000 Hz and high = 11520 Hz must be 0 < low < high" in error
     path = tmp_path / "a.csv"

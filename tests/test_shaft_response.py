@@ -624,7 +624,7 @@ def test_receptance_refuses(change, message):
 
 def test_a_basis_of_another_beam_is_refused():
     basis = free_basis(shaft(element=1.0), limit_hz=100.0)
-    with pytest.raises(ValueError, match="must be of the rotor's own beam"):
+    with pytest.raises(ValueError, match="must match the rotor's beam"):
         reduce_rotor(line(), basis)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...sim.mechanism.crank_run import run_mechanism
 from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe_start
 from ...sim.pump.run_plan import steps_per_sample
-from ...sim.pump_setup.tables import begun
+from ...sim.pump_setup.tables import tables_and_start
 from ...sim.pump_setup.yielding import WAYS, bearing_mass_ratios, yielding_of
 from ...sim.scene.pump import PumpScene
 from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid
@@ -201,7 +201,7 @@ def _casing_ring(scene: PumpScene, mode: float, ratio: float, step: float, least
             "throws": scene.throws[:1],
         },
     )
-    t, start = begun(rigid, step, 0.0)
+    t, start = tables_and_start(rigid, step, 0.0)
     bodies = start.bodies.copy()
     bodies[:, 6:] = 0.0
     with np.errstate(all="ignore"):  # what is unstable overflows: that is the answer

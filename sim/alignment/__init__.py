@@ -1,4 +1,4 @@
-"""What each bearing of a shaft line carries: alignment, load calibration, jacking.
+"""Bearing loads of a shaft line: alignment, load calibration, jacking.
 
 It may import ``sim.brief``, ``sim.output``, ``sim.beam``.
 """

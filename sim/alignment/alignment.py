@@ -1,9 +1,9 @@
-"""Alignment of a shaft line: what each bearing carries, and which bearing must move by how much.
+"""Alignment of a shaft line: bearing loads, and their dependence on bearing heights.
 
 The beam is held in its vertical plane at the support points of its seats. With all of them held,
-the reactions are an affine function of the points' heights, and that one condensation of the beam
-(one banded factorisation) serves everything else: elastic supports in series, points that lift,
-other conditions, moves. Heights are positive upward, and a reaction is positive when it carries.
+the reactions are an affine function of the points' heights. That one condensation of the beam
+(one banded factorisation) serves all other cases: elastic supports in series, points that lift,
+other conditions, moves. Heights and supporting reactions are positive upward.
 
 A point never pulls: reaction >= 0, gap >= 0, and one of the two is zero. The reactions minimise
 the complementary energy among all that balance the loads; that energy is strictly convex in them,
@@ -33,26 +33,26 @@ from .seats import AlignmentError, Seat, line_faults
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_BAND = 3  # half bandwidth of one plane: two coordinates a node, neighbours only
-MET = 1e-6  # of a limit: no gauge sees it
+_BAND = 3  # half bandwidth of one plane: two coordinates per node, coupled to neighbours only
+MET = 1e-6  # of a limit: below any gauge's resolution
 
 
 @dataclass(frozen=True, kw_only=True)
 class Condition:
-    """A state of the ship in which the line must be within its limits.
+    """State of the ship in which the line must be within its limits.
 
     Attributes
     ----------
     name : str
         "cold", "hot", "running", ...
     rises : tuple of float
-        How far each bearing stands above its offset [m]: thermal rise, hull deflection, lift of
+        Height of each bearing above its offset [m]: thermal rise, hull deflection, lift of
         the journal on its film. Empty: none.
     slopes : tuple of float
-        What the hull's deflection adds to the slope of each bore [rad]. Empty: nothing.
+        Additional slope of each bore from the hull's deflection [rad]. Empty: none.
     loads : tuple of PointLoad
-        Beyond those of the beam: the moment of the propeller's eccentric thrust, gear forces.
-        Their stations must be nodes; the sideways parts have no part here.
+        In addition to those of the beam: the moment of the propeller's eccentric thrust, gear
+        forces. Their stations must be nodes; sideways components are ignored.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Condition:
 
 
 AS_SET = Condition(name="as set")
-"""Nothing but the offsets."""
+"""The offsets alone."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,12 +74,12 @@ class AlignmentLine:
     beam : Beam
         With nodes at all `seat_stations`.
     seats : tuple of Seat
-        From aft forward, with two support points or more.
+        From aft forward, with at least two support points.
 
     Raises
     ------
     AlignmentError
-        A seat is out of its range, out of order, or on no node; all faults at once.
+        A seat is out of range, out of order, or not at a node; all faults together.
 
     Examples
     --------
@@ -104,7 +104,7 @@ class AlignmentLine:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the seats, from aft."""
+        """Names of the seats, from aft."""
         return tuple(seat.name for seat in self.seats)
 
     def seat(self, name: str) -> int:
@@ -117,26 +117,26 @@ class AlignmentLine:
         """
         if name not in self.names:
             raise AlignmentError(
-                f"bearing = '{name}' must be one of {', '.join(self.names)}; choose one of them"
+                f"bearing = '{name}' must be one of {', '.join(self.names)}; choose one"
             )
         return self.names.index(name)
 
     @cached_property
     def held(self) -> "HeldLine":
-        """The beam condensed to its support points."""
+        """Beam condensed to its support points."""
         return _condense(self.beam, self.seats)
 
     def moved(
         self, moves: Mapping[str, float] | ArrayLike = (), turns: ArrayLike = ()
     ) -> "AlignmentLine":
-        """The line with its bearings moved.
+        """Line with its bearings moved.
 
         Parameters
         ----------
         moves : mapping of str to float, or array_like [shape=(n,)]
-            Upward [m]; names that are left out stay.
+            Upward [m]; bearings not named stay.
         turns : array_like [shape=(n,)], optional
-            Of the bores [rad].
+            Turns of the bores [rad].
 
         Returns
         -------
@@ -148,30 +148,30 @@ class AlignmentLine:
             for seat, m, t in zip(self.seats, up, turn, strict=True)
         )
         line = AlignmentLine(beam=self.beam, seats=seats)
-        line.__dict__["held"] = self.held  # heights have no part in it
+        line.__dict__["held"] = self.held  # independent of the heights
         return line
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineState:
-    """A line at rest.
+    """Equilibrium of a line.
 
     Attributes
     ----------
     line : AlignmentLine
     condition : Condition
     reactions : numpy.ndarray [shape=(n,)]
-        Of the bearings, upward on the shaft [N].
+        Reactions of the bearings, upward on the shaft [N].
     point_reactions : numpy.ndarray [shape=(p,)]
-        Of the support points [N], in the order of ``line.held.stations``.
+        Reactions of the support points [N], in the order of ``line.held.stations``.
     gaps : numpy.ndarray [shape=(p,)]
-        Between the shaft and the bottom of the bore [m].
+        Gaps between the shaft and the bottom of the bore [m].
     slopes : numpy.ndarray [shape=(n,)]
-        Of the shaft at the stations of the bearings [rad].
+        Slopes of the shaft at the stations of the bearings [rad].
     relative_slopes : numpy.ndarray [shape=(n,)]
-        The same against the bores [rad].
+        Slopes of the shaft relative to the bores [rad].
     deflections, rotations : numpy.ndarray [shape=(n_nodes,)]
-        Of the shaft [m], [rad].
+        Deflection of the shaft [m], [rad].
     """
 
     line: AlignmentLine
@@ -188,26 +188,26 @@ class LineState:
 
     @property
     def lifted(self) -> tuple[str, ...]:
-        """Bearings that carry nothing at any of their points."""
+        """Bearings without load at all of their points."""
         held = self.line.held
         touching = set(held.owner[self.contact].tolist())
         return tuple(name for i, name in enumerate(self.line.names) if i not in touching)
 
     @property
     def contact(self) -> NDArray[np.bool_]:
-        """Points that the shaft lies on [shape=(p,)]."""
+        """Points in contact with the shaft [shape=(p,)]."""
         return self.gaps <= NO_GAP
 
     @property
     def pressures(self) -> Vector:
-        """Mean, on the projected area [shape=(n,)], [Pa]; NaN where the size is not given."""
+        """Mean pressures on the projected area [shape=(n,)], [Pa]; NaN if the size is not given."""
         area = np.array([seat.area or math.nan for seat in self.line.seats])
         pressures: Vector = self.reactions / area
         return pressures
 
     @property
     def edge_pressures(self) -> Vector:
-        """Mean over the most loaded point's share of each bearing [shape=(n,)], [Pa]."""
+        """Mean pressures on the share of each bearing's most loaded point [shape=(n,)], [Pa]."""
         worst = np.zeros(len(self.line.seats))
         np.maximum.at(worst, self.line.held.owner, self.point_reactions)
         share = [seat.area / seat.points or math.nan for seat in self.line.seats]
@@ -222,13 +222,13 @@ class LineState:
 
     @property
     def cut_stations(self) -> Vector:
-        """Where `moments` and `shear` are, each inner node twice [m]."""
+        """Stations of `moments` and `shear`, each inner node twice [m]."""
         stations: Vector = self._forces.stations
         return stations
 
     @property
     def moments(self) -> Vector:
-        """Bending moment at `cut_stations`, positive where the shaft sags [N m]."""
+        """Bending moments at `cut_stations`, positive where the shaft sags [N m]."""
         moments: Vector = self._forces.moment_up
         return moments
 
@@ -242,7 +242,7 @@ class LineState:
 def reactions(
     line: AlignmentLine, condition: Condition = AS_SET, *, unilateral: bool = True
 ) -> LineState:
-    """Reactions, deflection and slopes of a line at rest.
+    """Reactions, deflection and slopes of a line in equilibrium.
 
     Parameters
     ----------
@@ -251,8 +251,8 @@ def reactions(
     condition : Condition
         State of the ship.
     unilateral : bool
-        False lets the bearings pull, as most class calculations do; a negative reaction then
-        says that the bearing lifts.
+        False: allow tension, like most class calculations; a negative reaction then indicates
+        that the bearing lifts.
 
     Returns
     -------
@@ -288,20 +288,20 @@ def reactions(
 
 
 def influence(line: AlignmentLine, state: LineState | None = None) -> Vector:
-    """Change of each bearing's reaction when a bearing is raised.
+    """Change of each bearing's reaction per rise of a bearing.
 
     Parameters
     ----------
     line : AlignmentLine
         Beam and seats.
     state : LineState, optional
-        Points that it lifts stay away; by default all are in contact.
+        Points that are lifted in this state stay free; by default all are in contact.
 
     Returns
     -------
     numpy.ndarray [shape=(n, n)]
-        [N/m], symmetric; row i is the reaction of bearing i. Rows and their first moments add up
-        to zero: raising and turning the whole line changes nothing.
+        Influence numbers [N/m], symmetric; row i is the reaction of bearing i. Rows and their first
+        moments sum to zero: raising and turning the whole line changes nothing.
 
     Examples
     --------
@@ -326,7 +326,7 @@ def influence(line: AlignmentLine, state: LineState | None = None) -> Vector:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One quantity of one bearing in one condition, against its limits.
+    """One quantity of one bearing in one condition, with its limits.
 
     Attributes
     ----------
@@ -345,12 +345,12 @@ class Check:
 
     @property
     def shortfall(self) -> float:
-        """How far the value is out of its limits, zero within [unit of the quantity]."""
+        """Violation of the limits, zero within them [unit of the quantity]."""
         return max(self.least - self.value, self.value - self.most, 0.0)
 
     @property
     def met(self) -> bool:
-        """True where the value is within its limits, to rounding."""
+        """Whether the value is within its limits, to rounding."""
         bound = self.least if self.value < self.least else self.most
         return self.shortfall <= MET * abs(bound)
 
@@ -373,21 +373,21 @@ LIMIT_UNITS = {
     "slope": ("mm/m", 1e3),
     "move": ("mm", 1e3),
 }
-"""Of a quantity, for people, and how many there are in one of SI."""
+"""Display unit of a quantity, and its factor from SI."""
 
 
 def check(state: LineState) -> tuple[Check, ...]:
-    """Every limit of every bearing against a state; bearings without a limit give none.
+    """Check a state against every limit of every bearing; bearings without limits have no checks.
 
     Parameters
     ----------
     state : LineState
-        Of :func:`reactions`.
+        Result of :func:`reactions`.
 
     Returns
     -------
     tuple of Check
-        In the order of the bearings.
+        Checks in the order of the bearings.
 
     Examples
     --------
@@ -409,7 +409,7 @@ def check(state: LineState) -> tuple[Check, ...]:
 def _limit_rows(seat: Seat, state: LineState, i: int) -> Iterator[dict[str, Any]]:
     load = float(state.reactions[i])
     if seat.least_load > 0 or math.isfinite(seat.most_load):
-        low, high = seat.least_load or -math.inf, seat.most_load  # it cannot pull anyway
+        low, high = seat.least_load or -math.inf, seat.most_load  # no tension anyway
         yield {"quantity": "reaction", "value": load, "least": low, "most": high}
     if math.isfinite(seat.most_pressure):
         value, most = load / seat.area, seat.most_pressure
@@ -420,7 +420,7 @@ def _limit_rows(seat: Seat, state: LineState, i: int) -> Iterator[dict[str, Any]
 
 
 def span_loads(line: AlignmentLine) -> Vector:
-    """What each bearing would carry if the shaft were hinged at every bearing.
+    """Load of each bearing for a shaft hinged at every bearing.
 
     Parameters
     ----------
@@ -430,8 +430,8 @@ def span_loads(line: AlignmentLine) -> Vector:
     Returns
     -------
     numpy.ndarray [shape=(n,)]
-        [N]; they add up to the whole load. Half of each neighbouring span, and the overhangs
-        with the lever of their span. A share of it is a usual least load of a bearing.
+        Loads [N]; they sum to the total load. Half of each neighbouring span, and the overhangs
+        by the lever of their span. A share of this is a usual least load of a bearing.
 
     Examples
     --------
@@ -445,7 +445,7 @@ def span_loads(line: AlignmentLine) -> Vector:
     e, at = line.beam.elements, line.beam.stations
     seats = np.array([seat.station for seat in line.seats])
     load = line.beam.load.reshape(-1, 4)[:, :2].copy()
-    even = e.up * e.length**2 / 12  # an even load's end moments carry nothing between hinges
+    even = e.up * e.length**2 / 12  # a uniform load's end moments have no effect between hinges
     load[:-1, 1] -= even
     load[1:, 1] += even
     span = np.clip(np.searchsorted(seats, at, side="right") - 1, 0, seats.size - 2)
@@ -457,7 +457,7 @@ def span_loads(line: AlignmentLine) -> Vector:
     return carried
 
 
-# --- the beam, condensed
+# --- condensation of the beam
 
 
 def _condense(beam: Beam, seats: Sequence[Seat]) -> HeldLine:
@@ -524,21 +524,21 @@ def vertical_load(line: AlignmentLine, condition: Condition) -> Vector:
 
 
 def gather_points(line: AlignmentLine) -> Vector:
-    """(n, p): sums the points of each seat."""
+    """Matrix (n, p) that sums the points of each seat."""
     owner = line.held.owner
     gather: Vector = (owner == np.arange(len(line.seats))[:, None]).astype(float)
     return gather
 
 
 def lever_arms(line: AlignmentLine) -> Vector:
-    """(p,): forward of the middle of the seat [m]."""
+    """Lever arms (p,) of the points, forward of the middle of the seat [m]."""
     middle = np.array([seat.station for seat in line.seats])
     arms: Vector = line.held.stations - middle[line.held.owner]
     return arms
 
 
 def point_heights(line: AlignmentLine, condition: Condition) -> Vector:
-    """Of the bottoms of the bores at the support points, (p,) [m]."""
+    """Heights of the bottoms of the bores at the support points, (p,) [m]."""
     rise = per_seat(line, condition.rises, f"rises of condition '{condition.name}'")
     turn = per_seat(line, condition.slopes, f"slopes of condition '{condition.name}'")
     middle = rise + [seat.offset for seat in line.seats]
@@ -569,7 +569,7 @@ def _state(
 
 
 def per_seat(line: AlignmentLine, values: Any, name: str) -> Vector:
-    """One number for each seat, from a mapping, a sequence, or nothing."""
+    """One number for each seat, from a mapping, a sequence, or an empty value."""
     n = len(line.seats)
     if isinstance(values, Mapping):
         array = np.zeros(n)

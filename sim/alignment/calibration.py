@@ -1,7 +1,7 @@
 """Load calibration: the least moves of the bearings that bring a shaft line within its limits.
 
 A mixed-integer linear programme over the moves, with a switch for every support point that may
-lift, in all conditions at once; the line is then solved anew with the moves.
+lift, for all conditions together; the line is then solved again with the moves.
 """
 
 import math
@@ -20,22 +20,22 @@ from .seats import AlignmentError
 
 Vector = NDArray[np.float64]
 
-_PROMISE = 1e-6  # of a mean load, between the programme and the line solved anew
+_PROMISE = 1e-6  # of a mean load: largest difference of the programme from the line solved again
 
 _PREFER = ("least", "fewest")
 _TARGETS = ("limits", "even")
 
-_NEARLY = 0.999  # of a margin that would leave one load only
-_JUST = 5e-3  # of a limit: nearer is on it
-_HALVINGS = 6  # of a margin that cannot be kept: to 1/64 of it
+_NEARLY = 0.999  # of a margin that would leave a single admissible load
+_JUST = 5e-3  # of a limit: a quantity closer than this is at the limit
+_HALVINGS = 6  # of a margin that cannot be kept: down to 1/64 of it
 
 
 class CalibrationStatus(Ending):
-    """How a calibration ended. Everything but WITHIN and DONE carries a cure."""
+    """How a calibration ended. Every status except WITHIN and DONE includes a cure."""
 
     WITHIN = 0, "every limit is met; nothing moves"
     DONE = 1, "the moves bring every reaction, pressure and slope within its limits"
-    INFEASIBLE = 2, "no moves within their bounds bring every limit; widen one of what blocks"
+    INFEASIBLE = 2, "no moves within their bounds meet every limit; widen one of the blocks"
     UNRESOLVED = (
         3,
         "the search did not settle; give close support points a finite stiffness, fewer points, "
@@ -44,32 +44,32 @@ class CalibrationStatus(Ending):
 
     @property
     def ok(self) -> bool:
-        """True where every limit is met after the moves."""
+        """Whether every limit is met after the moves."""
         return self in (CalibrationStatus.WITHIN, CalibrationStatus.DONE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Calibration:
-    """Bearing moves that mend an alignment.
+    """Bearing moves that correct an alignment.
 
     Attributes
     ----------
     status : CalibrationStatus
     line : AlignmentLine
-        Before the moves.
+        Line before the moves.
     moves, turns : numpy.ndarray [shape=(n,)]
-        Upward [m], and of the bores [rad].
+        Upward moves [m], and turns of the bores [rad].
     before, after : tuple of LineState
-        One for each condition. `after` is solved anew with the moves in the line.
+        One state for each condition. `after` is solved again with the moves in the line.
     promised : numpy.ndarray [shape=(n_conditions, n)]
-        Reactions that the programme counted on [N].
+        Reactions expected by the programme [N].
     unmet : tuple of Check
-        Limits that the moves do not bring, as they stand after the moves.
+        Limits still violated after the moves.
     margin : float
-        Of each limit, that the moves keep away from it.
+        Share of each limit that the moves keep as a margin.
     blocks : tuple of Block
-        Where there is no way: the bounds of moves that would have to be wider, by the least sum;
-        if that helps not, the limits that are at odds with each other whatever the moves.
+        If there is no solution: the bounds of moves that would have to be wider, with the least
+        sum; if that does not help, the limits that are in conflict for any moves.
     """
 
     status: CalibrationStatus
@@ -87,7 +87,7 @@ class Calibration:
 
     @property
     def touched(self) -> tuple[Check, ...]:
-        """Limits that the moves bring just within, so that little would break them again."""
+        """Limits that are just met after the moves, so that a small change would violate them."""
         if not self.moved:
             return ()
         near = [_tightened(state.line, _JUST) for state in self.after]
@@ -102,7 +102,7 @@ class Calibration:
 
     @property
     def total_move(self) -> float:
-        """Sum of all moves without their signs [m]."""
+        """Sum of the absolute moves [m]."""
         return float(np.abs(self.moves).sum())
 
     @property
@@ -113,7 +113,7 @@ class Calibration:
 
     @property
     def residual(self) -> float:
-        """Largest difference of promised and obtained reactions, of a bearing's mean load."""
+        """Largest difference of expected and obtained reactions, over a bearing's mean load."""
         return _difference(self.promised, self.after)
 
 
@@ -126,52 +126,52 @@ def calibrate(
     margin: float = 0.0,
     seconds: float = 20.0,
 ) -> Calibration:
-    """The moves of the bearings that bring every limit in every condition.
+    """Find the moves of the bearings that meet every limit in every condition.
 
     Parameters
     ----------
     line : AlignmentLine
         With limits, and bounds of the moves, in its seats.
     conditions : sequence of Condition
-        In which the limits must hold.
+        Conditions in which the limits must hold.
     prefer : str
-        "least" has the least sum of moves, "fewest" the least number of bearings moved and then
-        the least sum. Among equals the largest move is least.
+        "least": the least sum of moves; "fewest": the least number of bearings moved, and then
+        the least sum. Among equals the largest move is minimised.
     target : str
-        "limits" moves as little as the limits ask; "even" moves, whether a limit is met or not,
-        until the squares of the reactions' distances from their mean have the least sum over
-        bearings and conditions, within a hundredth, by the least moves that do so.
+        "limits": moves as little as the limits require; "even": moves, even if all limits are met,
+        until the sum of squared differences between reactions and their mean, over
+        bearings and conditions, is within a hundredth of its minimum, by the least moves.
     margin : float
         Distance that the line must keep from every limit, as a share of the limit, >= 0 and < 1.
-        Where the moves cannot keep it, but can keep the limits, they keep as much of it as they
-        can, to a sixty-fourth of it.
+        If the moves cannot keep it but can meet the limits, they keep as much of it as
+        possible, down to a sixty-fourth.
     seconds : float
-        For each of the few programmes to solve.
+        Time limit for each of the few programmes.
 
     Returns
     -------
     Calibration
-        Where no moves bring every limit: those that bring the unmet ones nearest, with what
-        blocks. In any case nothing is unmet after the moves that was met before.
+        If no moves meet every limit: those that come closest, with the blocks. In any case no
+        limit that was met before is violated after the moves.
 
     Raises
     ------
     AlignmentError
-        There is no condition, two have one name, `prefer` or `target` is unknown, `margin` is no
-        share, "fewest" is asked for together with "even", or a condition does not fit the line.
+        There is no condition, two have one name, `prefer` or `target` is unknown, `margin` is not a
+        share, "fewest" is combined with "even", or a condition does not fit the line.
 
     Notes
     -----
     A turn counts as the move of the bore's edge. With every point in contact, reactions and slopes
-    are affine in the moves; a point that lifts by g is as if its seat stood higher by g and
-    carried nothing. So for each point that may lift, ``r >= 0``, ``g >= 0`` and a switch that
-    closes one of them: a mixed-integer linear programme, solved by HiGHS; without such points a
-    linear one. Points may lift where their seat has several, or needs no least load. With the
-    switches as found, the programme is solved once more as a linear one. If there is no solution,
+    are affine in the moves; a point that lifts by g acts as if its seat were higher by g, without
+    load. So for each point that may lift, ``r >= 0``, ``g >= 0`` and a switch that
+    sets one of them to zero: a mixed-integer linear programme, solved by HiGHS; without such points
+    a linear one. Points may lift if their seat has several, or needs no least load. With the
+    switches found, the programme is solved once more as a linear one. If there is no solution,
     the unmet limits become elastic and their sum of violations, each over the mean load or the
-    limit of the slope, is made least. What blocks is found by making the bounds of the moves
-    elastic instead, of bearings that move at all before the others; if that helps not, by making
-    the limits elastic without bounds of the moves, whose multipliers name what stands against.
+    limit of the slope, is minimised. Blocks are found by making the bounds of the moves
+    elastic instead, first for bearings that move at all; if that does not help, by making
+    the limits elastic without bounds of the moves, where multipliers identify the conflicts.
 
     References
     ----------
@@ -203,7 +203,7 @@ def calibrate(
 
 @dataclass(frozen=True, kw_only=True)
 class _Ask:
-    """What is asked of a calibration, but for its margin."""
+    """Options of a calibration except its margin."""
 
     prefer: str
     target: str
@@ -217,7 +217,7 @@ def _with_most_margin(
     ask: _Ask,
     wanted: float,
 ) -> Calibration:
-    """The calibration that keeps as much of a margin as can be, by halving."""
+    """Calibration that keeps as much of a margin as possible, by halving."""
     best, least, most = plain, 0.0, wanted
     for _ in range(_HALVINGS):
         margin = (least + most) / 2
@@ -263,7 +263,7 @@ def _wanted_moves(
 
 
 def _tightened(line: AlignmentLine, margin: float) -> AlignmentLine:
-    """The line with every limit nearer by a share of itself."""
+    """Line with every limit reduced by a share of itself."""
     if margin == 0:
         return line
     seats = tuple(
@@ -280,7 +280,7 @@ def _tightened(line: AlignmentLine, margin: float) -> AlignmentLine:
 
 
 def _widest_margin(line: AlignmentLine) -> float:
-    """The largest margin that leaves every bearing a load between its limits."""
+    """Largest margin that leaves every bearing a load between its limits."""
     return _NEARLY * min(
         (seat.highest_load - seat.least_load) / (seat.highest_load + seat.least_load)
         if math.isfinite(seat.highest_load) and seat.highest_load > 0
@@ -290,9 +290,9 @@ def _widest_margin(line: AlignmentLine) -> float:
 
 
 def _with_limits_of(found: Calibration, line: AlignmentLine) -> Calibration:
-    """A calibration found with nearer limits, its states judged by those of the line again."""
+    """Calibration found with tighter limits, with its states checked against the line's own."""
 
-    def judged(state: LineState) -> LineState:
+    def with_own_limits(state: LineState) -> LineState:
         seats = tuple(
             replace(plain, offset=seat.offset, slope=seat.slope)
             for plain, seat in zip(line.seats, state.line.seats, strict=True)
@@ -302,8 +302,8 @@ def _with_limits_of(found: Calibration, line: AlignmentLine) -> Calibration:
     return replace(
         found,
         line=line,
-        before=tuple(map(judged, found.before)),
-        after=tuple(map(judged, found.after)),
+        before=tuple(map(with_own_limits, found.before)),
+        after=tuple(map(with_own_limits, found.after)),
     )
 
 
@@ -374,7 +374,7 @@ def _unresolved(line: AlignmentLine, before: tuple[LineState, ...]) -> Calibrati
 
 
 def _confirmed(found: Calibration) -> bool:
-    """The moves, put into the line, do as promised and spoil nothing."""
+    """Whether the moves, applied to the line, act as expected and violate nothing new."""
     if found.residual > _PROMISE or (found.status is CalibrationStatus.DONE and found.unmet):
         return False
     met = {

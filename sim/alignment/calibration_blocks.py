@@ -1,4 +1,4 @@
-"""What keeps a load calibration from its limits, and would have to give."""
+"""Limits and bounds that prevent a load calibration."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ from .seats import Seat
 
 
 def with_seats(line: AlignmentLine, seats: tuple[Seat, ...]) -> AlignmentLine:
-    """The line with other limits or bounds, which bend no shaft."""
+    """Line with other limits or bounds, which do not affect the shaft."""
     other = AlignmentLine(beam=line.beam, seats=seats)
     other.__dict__["held"] = line.held
     return other
@@ -31,7 +31,7 @@ def with_seats(line: AlignmentLine, seats: tuple[Seat, ...]) -> AlignmentLine:
 def blocks_of(
     line: AlignmentLine, before: Sequence[LineState], seconds: float
 ) -> tuple[Block, ...]:
-    """What would have to give: bounds of moves, of those that move at all first; else limits."""
+    """Blocks: bounds of moves, first for bearings that move at all; else limits."""
     seats = line.seats
     reach = max(response_of(state).widest for state in before) / (5 * MILLIMETRES)
     moving = np.array([seat.least_move < seat.most_move for seat in seats])
@@ -44,7 +44,7 @@ def blocks_of(
 
 
 def _with_wide_moves(line: AlignmentLine, may: NDArray[np.bool_], reach: float) -> AlignmentLine:
-    """The line with wide bounds of the moves where they may be wide."""
+    """Line with wide bounds for the moves that may be widened."""
     seats = tuple(
         replace(seat, least_move=-reach + seat.least_move, most_move=reach + seat.most_move)
         if wide
@@ -57,7 +57,7 @@ def _with_wide_moves(line: AlignmentLine, may: NDArray[np.bool_], reach: float) 
 def _widening(
     line: AlignmentLine, free: AlignmentLine, before: Sequence[LineState], seconds: float
 ) -> tuple[Block, ...]:
-    """The least widening of the bounds of moves with which every limit can be met."""
+    """Least widening of the bounds of moves with which every limit can be met."""
     programme = programme_of(free, before, elastic=False)
     n, size = programme.n, programme.least.size
     wide = widened(programme, 2 * n, np.inf, whole=False)
@@ -92,9 +92,9 @@ def _move_block(seat: Seat, excess: float, *, upper: bool) -> Block:
 def _conflict(
     free: AlignmentLine, before: Sequence[LineState], seconds: float
 ) -> tuple[Block, ...]:
-    """Limits that no moves bring together: those that would have to give, and what stands against.
+    """Limits that no moves meet together: those that would have to change, and their opponents.
 
-    The latter are the rows with a multiplier where the violation is least.
+    Opponents are the rows with a multiplier at the least violation.
     """
     programme = programme_of(free, before, elastic=True)
     violation = programme.slack.astype(float)

@@ -1,4 +1,4 @@
-"""Contact of a line that is held at points: which of them bear, and with what force."""
+"""Contact of a line on its support points: which are in contact, and their forces."""
 
 from dataclasses import dataclass
 
@@ -11,26 +11,26 @@ from .seats import FEWEST_POINTS, AlignmentError
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-NO_LOAD = 1e-9  # of the whole load: below this a reaction is rounding
+NO_LOAD = 1e-9  # of the whole load: smaller reactions are rounding
 NO_GAP = 1e-12  # m
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeldLine:
-    """The beam with all its support points held: reactions and deflection over their heights.
+    """Beam with all its support points held: reactions and deflection as functions of the heights.
 
     Attributes
     ----------
     stations : numpy.ndarray [shape=(p,)]
-        Of the support points [m].
+        Positions of the support points [m].
     owner : numpy.ndarray [shape=(p,)]
         Seat of each point.
     stiffness : numpy.ndarray [shape=(p,)]
-        Of each point's seat share [N/m], infinite where rigid.
+        Stiffness of each point's share of its seat [N/m], infinite if rigid.
     influence : numpy.ndarray [shape=(p, p)]
-        Change of reaction by height, all others held [N/m].
+        Change of reaction per height, all others held [N/m].
     lines : numpy.ndarray [shape=(2 n, p)]
-        Deflection and slope of every node by height.
+        Deflection and slope of every node per height.
     """
 
     stations: Vector
@@ -51,10 +51,10 @@ class HeldLine:
 
 
 def following(held: HeldLine, contact: NDArray[np.bool_]) -> tuple[Vector, Vector]:
-    """T and G of the shaft's heights at the points, ``y = T h - G dead``.
+    """Matrices T and G of the shaft's heights at the points, ``y = T h - G dead``.
 
-    A rigid point in contact stands at its height; the others balance their springs, those off
-    contact nothing: ``(A + k) y = k h - dead``.
+    A rigid point in contact is at its height; the others are in equilibrium with their springs, or
+    free without contact: ``(A + k) y = k h - dead``.
     """
     spring = np.where(contact, held.stiffness, 0.0)
     rigid = np.isinf(spring)
@@ -75,7 +75,7 @@ def following(held: HeldLine, contact: NDArray[np.bool_]) -> tuple[Vector, Vecto
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rest:
-    """Reactions and the shaft's height at the points, and which of them are in contact."""
+    """Reactions and heights of the shaft at the points, and which of them are in contact."""
 
     force: Vector
     height: Vector
@@ -83,7 +83,7 @@ class Rest:
 
 
 def rest_on(held: HeldLine, dead: Vector, heights: Vector, contact: NDArray[np.bool_]) -> Rest:
-    """Rest with the given points in contact and the others free, whatever the signs."""
+    """Equilibrium with the given points in contact and the others free, ignoring the signs."""
     follow, give = following(held, contact)
     y = follow @ heights - give @ dead
     force = dead + held.influence @ y
@@ -92,11 +92,11 @@ def rest_on(held: HeldLine, dead: Vector, heights: Vector, contact: NDArray[np.b
 
 
 def come_to_rest(held: HeldLine, dead: Vector, heights: Vector) -> Rest:
-    """Rest on points that only push: a primal active set on the reactions.
+    """Equilibrium on unilateral points: a primal active set on the reactions.
 
-    It starts from the two outermost points, which carry every load they can carry, and then takes
-    in the point that the shaft sinks into most, letting go those that would pull on the way. The
-    complementary energy falls in each round, so that no set of points comes twice.
+    It starts from the two outermost points, which can carry any downward load, and then adds
+    the point with the largest penetration, dropping points that would pull on the way. The
+    complementary energy falls in each round, so that no set of points repeats.
     """
     least = -NO_LOAD * float(np.abs(dead).sum())
     rest = rest_on(held, dead, heights, np.ones(dead.size, dtype=bool))
@@ -113,13 +113,13 @@ def come_to_rest(held: HeldLine, dead: Vector, heights: Vector) -> Rest:
         contact = contact.copy()
         contact[int(np.argmin(gap))] = True
     raise AlignmentError(
-        "which bearings lift could not be settled; two support points may stand too close: give "
+        "the lifting bearings could not be determined; two support points may be too close: give "
         "them a finite stiffness, or fewer points"
     )
 
 
 def _two_point_start(held: HeldLine, dead: Vector) -> Vector:
-    """Reactions of the first and the last point alone."""
+    """Reactions with only the first and the last point."""
     s = held.stations
     load, moment = float(dead.sum()), float(dead @ s)
     if not load > 0 or not s[0] * load <= moment <= s[-1] * load:
@@ -127,7 +127,7 @@ def _two_point_start(held: HeldLine, dead: Vector) -> Vector:
         raise AlignmentError(
             f"resultant of the loads = {load / 1e3:.4g} kN {where} must act downward between the "
             f"first support at {s[0]:.4g} m and the last at {s[-1]:.4g} m, or the shaft tips; add "
-            "a support or mend the loads"
+            "a support or correct the loads"
         )
     force = np.zeros(s.size)
     force[-1] = (moment - load * s[0]) / (s[-1] - s[0])
@@ -143,7 +143,7 @@ def _let_go(
     force: Vector,
     least: float,
 ) -> tuple[Rest, NDArray[np.bool_], Vector]:
-    """Rest on the points in contact less those that come to pull on the way from `force`."""
+    """Equilibrium on the points in contact, dropping those that begin to pull from `force` on."""
     while True:
         rest = rest_on(held, dead, heights, contact)
         pulls = contact & (rest.force < least)

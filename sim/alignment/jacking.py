@@ -1,4 +1,4 @@
-"""What a jack beside a bearing tells of its reaction."""
+"""Jacking test next to a bearing: load on the jack over lift, and the bearing's reaction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ from .seats import FEWEST_POINTS, AlignmentError, Seat
 
 Vector = NDArray[np.float64]
 _BESIDE = 1e-9  # m
-_FIRST_LIFT = 1e-5  # m, of a search that doubles
+_FIRST_LIFT = 1e-5  # m, start of a search by doubling
 _LONGEST_LIFT = 1.0  # m
 _LIFT_ERROR = 1e-10  # of the lift
 _JACK = "jack"
@@ -33,31 +33,31 @@ _JACK = "jack"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Jacking:
-    """What a jack beside a bearing would show.
+    """Simulated jacking test next to a bearing.
 
     Attributes
     ----------
     bearing : str
     station : float
-        Of the jack [m].
+        Position of the jack [m].
     lifts, loads : numpy.ndarray [shape=(k,)]
-        Of the shaft at the jack, from its rest [m], and on the jack [N].
+        Lift of the shaft at the jack from its rest [m], and load on the jack [N].
     first_slope, second_slope : float
-        Of the load over the lift, before the bearing yields anything and after it has come
+        Slope of the load over the lift, before the bearing unloads and after it has come
         free [N/m].
     free_lift, free_load : float
-        Where the bearing comes free [m], [N].
+        Point where the bearing comes free [m], [N].
     zero_load : float
-        Load of the second line, drawn back to no lift [N].
+        Load of the second line, extrapolated to zero lift [N].
     correction_factor : float
-        Reaction of the bearing over `zero_load`, by the flexibility of the line without the
-        bearing: of the shaft at the jack, by a force at the jack over the same by one at the
+        Reaction of the bearing over `zero_load`, from the flexibility of the line without the
+        bearing: that of the shaft at the jack for a force at the jack, over that for a force at the
         bearing.
     reaction : float
-        Of the bearing, as the line has it [N].
+        Reaction of the bearing in the line [N].
     others : tuple of str
-        Other bearings that lift or touch before this one comes free, or just then: then
-        `estimate` is off.
+        Other bearings that lift or touch before this one comes free, or at the same lift: then
+        `estimate` is inaccurate.
     """
 
     bearing: str
@@ -77,7 +77,7 @@ class Jacking:
 
     @property
     def estimate(self) -> float:
-        """Reaction as a jacking test gives it: correction factor times `zero_load` [N]."""
+        """Reaction estimated by a jacking test: correction factor times `zero_load` [N]."""
         return self.correction_factor * self.zero_load
 
 
@@ -89,7 +89,7 @@ def jacking(
     station: float | None = None,
     n_lifts: int = 41,
 ) -> Jacking:
-    """Load over lift of a jack beside a bearing, and the reaction that it tells.
+    """Load over lift of a jack next to a bearing, and the reaction estimated from it.
 
     Parameters
     ----------
@@ -100,7 +100,8 @@ def jacking(
     condition : Condition
         State of the ship.
     station : float, optional
-        Of the jack, a node outside all bearings [m]; by default the nearest to the bearing.
+        Position of the jack, a node outside all bearings [m]; by default the one nearest the
+        bearing.
     n_lifts : int
         Points of the curve, >= 2, from rest to twice the lift at which the bearing comes free.
 
@@ -112,13 +113,13 @@ def jacking(
     Raises
     ------
     AlignmentError
-        There is no such bearing, it carries nothing, the station is no node or inside a bearing,
+        There is no such bearing, it has no load, the station is no node or inside a bearing,
         or the bearing never comes free.
 
     Notes
     -----
-    Without friction: lifting and lowering give one curve. On the second line the bearing carries
-    nothing; drawn back to no lift, the jack would hold the shaft at the jack as high as the
+    Friction is neglected: lifting and lowering give the same curve. On the second line the bearing
+    has no load; extrapolated to zero lift, the jack would hold the shaft at the jack as high as the
     bearing's reaction R does now, so that ``R f_jb = F f_jj`` with f the flexibility without
     jack and bearing.
 
@@ -133,7 +134,7 @@ def jacking(
     (1.1, 0.625, 0.9945)
     """
     if n_lifts < FEWEST_POINTS:
-        raise AlignmentError(f"n_lifts = {n_lifts} must be >= {FEWEST_POINTS}; 41 will do")
+        raise AlignmentError(f"n_lifts = {n_lifts} must be >= {FEWEST_POINTS}; 41 is usual")
     number = line.seat(bearing)
     rest = reactions(line, condition)
     if not rest.reactions[number] > NO_LOAD * rest.reactions.sum():
@@ -169,14 +170,14 @@ class _Test:
 
     line: AlignmentLine  # with the jack among its seats
     dead: Vector
-    heights: Vector  # of the jack: where it touches the shaft at rest
+    heights: Vector  # that of the jack: where it touches the shaft at rest
     share: Vector  # of the bearing's reaction on its points
     contact: NDArray[np.bool_]  # at rest, with the jack
     jack: int
 
     @property
     def own(self) -> NDArray[np.bool_]:
-        """Points of the bearing that carry at rest."""
+        """Points of the bearing in contact at rest."""
         return self.share > 0
 
 
@@ -206,7 +207,7 @@ def _jack_station(line: AlignmentLine, number: int) -> float:
         inside |= np.abs(at - seat.station) <= seat.length / 2 + _BESIDE
     if inside.all():
         raise AlignmentError(
-            f"bearing '{line.names[number]}' has no node beside it for a jack; name one in "
+            f"bearing '{line.names[number]}' has no node next to it for a jack; add one in "
             "`stations` of assemble_beam"
         )
     outside = at[~inside]
@@ -227,7 +228,7 @@ def _free_lift(test: _Test, bearing: str) -> float:
         if high > _LONGEST_LIFT:
             raise AlignmentError(
                 f"bearing '{bearing}' does not come free within a lift of {_LONGEST_LIFT:g} m; "
-                "put the jack nearer to it"
+                "place the jack nearer to it"
             )
     while high - low > _LIFT_ERROR * high:
         middle = (low + high) / 2
@@ -251,7 +252,7 @@ def _correction(test: _Test, contact: NDArray[np.bool_]) -> float:
 
 
 def _changed(test: _Test, contact: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Other bearings with a point that is in contact now and was not, or the reverse."""
+    """Other bearings with a point whose contact differs from that at rest."""
     owner = test.line.held.owner
     own = set(owner[test.own].tolist())
     changed = set(owner[contact != test.contact].tolist()) - own
@@ -263,18 +264,18 @@ def _changed(test: _Test, contact: NDArray[np.bool_]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Flange:
-    """Two open flanges that face each other.
+    """Two open flanges facing each other.
 
     Attributes
     ----------
     station : float
-        [m]
+        Position of the coupling [m].
     sag : float
-        How far the forward flange stands above the aft one [m].
+        Height of the forward flange above the aft one [m].
     angle : float
-        By which the faces open at the top [rad].
+        Opening angle of the faces at the top [rad].
     heights, slopes : tuple of float
-        Of the aft and the forward flange [m], [rad].
+        Height and slope of the aft and the forward flange [m], [rad].
     """
 
     station: float
@@ -284,7 +285,7 @@ class Flange:
     slopes: tuple[float, float]
 
     def gap(self, diameter: float) -> float:
-        """Opening at the top less that at the bottom, over a flange diameter [m]."""
+        """Opening at the top minus opening at the bottom, for a flange diameter [m]."""
         return self.angle * diameter
 
 
@@ -294,18 +295,18 @@ def gap_and_sag(
     supports: Sequence[Seat] = (),
     condition: Condition = AS_SET,
 ) -> tuple[Flange, ...]:
-    """How the flanges of an open line must stand for the coupled line to lie as its offsets say.
+    """Gap and sag of the flanges of an open line for which the coupled line has its offsets.
 
     Parameters
     ----------
     line : AlignmentLine
         Beam and seats.
     cuts : sequence of float
-        Stations of the open couplings [m], inside the shaft.
+        Positions of the open couplings [m], inside the shaft.
     supports : sequence of Seat
-        Temporary ones, as long as the line is open.
+        Temporary supports while the line is open.
     condition : Condition
-        Its rises and slopes are of the bearings; its loads act on the pieces.
+        Its rises and slopes apply to the bearings, its loads to the pieces.
 
     Returns
     -------
@@ -315,12 +316,12 @@ def gap_and_sag(
     Raises
     ------
     AlignmentError
-        A cut is off the shaft, or a piece does not rest on its supports; its stations are named.
+        A cut is off the shaft, or a piece does not rest on its supports; its stations are given.
 
     Notes
     -----
-    Each piece lies on its own bearings and supports. Of a disc or a point load at a cut each
-    piece has half, as of a pair of flanges.
+    Each piece rests on its own bearings and supports. A disc or a point load at a cut is shared
+    equally by both pieces, like a pair of flanges.
 
     Examples
     --------
@@ -351,14 +352,14 @@ def gap_and_sag(
 
 
 def _in_condition(line: AlignmentLine, condition: Condition) -> list[Seat]:
-    """Seats that stand as the condition has them."""
+    """Seats at the heights and slopes of the condition."""
     rises = per_seat(line, condition.rises, f"rises of condition '{condition.name}'")
     turns = per_seat(line, condition.slopes, f"slopes of condition '{condition.name}'")
     return list(line.moved(rises, turns).seats)
 
 
 def _nodal_loads(beam: Beam) -> list[PointLoad]:
-    """What acts on the nodes beside the even loads of the elements."""
+    """Loads on the nodes in addition to the uniform loads of the elements."""
     e, force = beam.elements, beam.load.reshape(-1, 4)[:, :2].copy()
     for nodes, turn in ((slice(None, -1), 1.0), (slice(1, None), -1.0)):
         force[nodes, 0] -= e.up * e.length / 2
@@ -372,7 +373,7 @@ def _nodal_loads(beam: Beam) -> list[PointLoad]:
 def _piece(
     beam: Beam, seats: Sequence[Seat], loads: Sequence[PointLoad], low: float, high: float
 ) -> LineState:
-    """The piece between two cuts at rest; its stations count from `low`."""
+    """Equilibrium of the piece between two cuts; its stations count from `low`."""
     own = [
         replace(seat, station=seat.station - low)
         for seat in seats
@@ -389,7 +390,7 @@ def _piece(
 
 
 def _part(beam: Beam, loads: Sequence[PointLoad], low: float, high: float) -> Beam:
-    """The beam between two nodes, under the even loads of its elements and the nodal ones."""
+    """Beam between two nodes, under the uniform loads of its elements and the nodal ones."""
     e, at = beam.elements, beam.stations - low
     first, last = beam.node(low), beam.node(high)
     even = [
@@ -416,7 +417,7 @@ def _part(beam: Beam, loads: Sequence[PointLoad], low: float, high: float) -> Be
         stations=at[first : last + 1].tolist(),
         theory=beam.theory,
         shear_coefficient=beam.shear_coefficient,
-        gravity=0.0,  # it is in the loads
+        gravity=0.0,  # gravity is in the loads
     )
 
 

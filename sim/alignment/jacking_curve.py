@@ -1,7 +1,7 @@
-"""What a measured jacking curve tells: load on the jack over the lift of the shaft.
+"""Evaluation of a measured jacking curve: load on the jack over the lift of the shaft.
 
 Sources: the usual practice of jack-up tests, as in class societies' guides to shaft alignment: the
-line on which the bearing is free, drawn back to no lift, times the correction factor.
+line on which the bearing is free, extrapolated to zero lift, times the correction factor.
 """
 
 import math
@@ -13,37 +13,37 @@ from numpy.typing import ArrayLike, NDArray
 Vector = NDArray[np.float64]
 
 FEWEST = 8
-"""Points of a curve: a line through either part with some left to tell its scatter."""
+"""Least number of points: a line through each part, with some left to estimate the scatter."""
 
 _FEWEST_FREE = 4  # points with the bearing free
 _KNEES = 200  # lifts tried
-_CLEAR = 1.15  # over the knee: nearer, some rows of a long bearing still carry
-_SHARPEST = 0.9  # slope free over slope before: closer to 1 no knee is to be seen
+_CLEAR = 1.15  # times the knee: closer, some points of a long bearing still carry load
+_SHARPEST = 0.9  # slope free over slope before: closer to 1 no knee is visible
 
 
 class CurveError(ValueError):
-    """A jacking curve from which no reaction can be told."""
+    """A jacking curve from which no reaction can be determined."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CurveFit:
-    """The straight line of a jacking curve on which the bearing is free.
+    """Straight line of a jacking curve with the bearing free.
 
     Attributes
     ----------
     zero_load : float
-        That line drawn back to no lift [N].
+        Extrapolation of that line to zero lift [N].
     zero_load_deviation : float
-        Standard deviation by the scatter of its points [N].
+        Standard deviation from the scatter of its points [N].
     slope, slope_deviation : float
-        Of the line [N/m].
+        Slope of the line [N/m].
     first_slope : float
-        Before the bearing comes free [N/m].
+        Slope before the bearing comes free [N/m].
     free_lift : float
-        Where the two lines meet [m].
+        Intersection of the two lines [m].
     friction : float or None
-        By which a load is larger lifting and smaller lowering [N]; None where the curve has one
-        way only.
+        Increase of the load when lifting, decrease when lowering [N]; None if the curve has only
+        one direction.
     """
 
     zero_load: float
@@ -61,14 +61,14 @@ def fit_curve(lifts: ArrayLike, loads: ArrayLike) -> CurveFit:
     Parameters
     ----------
     lifts : array_like [shape=(n,)]
-        Of the shaft at the jack from its rest, in the order in which they were read [m].
+        Lift of the shaft at the jack from its rest, in the order of reading [m].
     loads : array_like [shape=(n,)]
-        On the jack [N].
+        Load on the jack [N].
 
     Returns
     -------
     CurveFit
-        The line, with standard deviations.
+        Line with standard deviations.
 
     Raises
     ------
@@ -77,9 +77,9 @@ def fit_curve(lifts: ArrayLike, loads: ArrayLike) -> CurveFit:
 
     Notes
     -----
-    Two lines that meet are fitted by least squares, for the lift at which they meet; then the
-    second alone through the points clear of it. Where the curve goes up and down, friction of jack
-    and seals is a constant with the sign of the way, fitted with the line.
+    Two lines that meet are fitted by least squares, to find the lift where they meet; then the
+    second alone through the points clear of it. If the curve goes up and down, friction of jack
+    and seals is a constant with the sign of the direction, fitted with the line.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def _refuse_points(at: Vector, load: Vector) -> None:
 
 
 def _ways(at: Vector) -> Vector:
-    """1 where a point was reached lifting, -1 lowering."""
+    """Direction of each point: 1 if reached by lifting, -1 by lowering."""
     step = np.sign(np.diff(at))
     for i in range(1, step.size):
         step[i] = step[i] or step[i - 1]
@@ -142,7 +142,7 @@ def _design(at: Vector, way: Vector | None, *more: Vector) -> Vector:
 
 
 def _least_squares(design: Vector, load: Vector) -> tuple[Vector, Vector]:
-    """Coefficients, and their covariance by the scatter about the fit."""
+    """Coefficients, and their covariance from the scatter about the fit."""
     value = np.linalg.lstsq(design, load, rcond=None)[0]
     left = load - design @ value
     freedom = load.size - design.shape[1]
@@ -155,7 +155,7 @@ def _least_squares(design: Vector, load: Vector) -> tuple[Vector, Vector]:
 
 
 def _knee(at: Vector, load: Vector, way: Vector | None) -> tuple[float, float, float, float]:
-    """Lift at which two lines meet best, load without lift, slope before and after."""
+    """Best intersection of two lines, load at zero lift, slope before and after."""
     low, high = (float(end) for end in np.sort(at)[[1, -2]])
     best = (math.inf, 0.0, 0.0, 0.0, 0.0)
     for knee in np.linspace(low, high, _KNEES):

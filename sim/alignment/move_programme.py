@@ -1,4 +1,4 @@
-"""The mixed-integer programme of a load calibration: its rows, and the moves found."""
+"""Mixed-integer programme of a load calibration: its rows, and the moves found."""
 
 import math
 from collections.abc import Sequence
@@ -24,35 +24,35 @@ from .contact import following
 Vector = NDArray[np.float64]
 
 MoveSolution = tuple[Vector, Vector, Vector]
-"""Moves [m], turns [rad], promised reactions [N]."""
+"""Moves [m], turns [rad], expected reactions [N]."""
 
-MILLIMETRES = 1e3  # mm in a metre: the programme's lengths are near one
-_RESERVE = 1e-6  # of a mean load: a limit is met to rounding and more
-FEASIBLE = 1e-9  # of HiGHS for a linear programme, well inside the reserve
-_LOOSE = 2e-7  # of HiGHS for a mixed one, which is 1e-7, and a little
+MILLIMETRES = 1e3  # mm per metre: the programme's lengths are near one
+_RESERVE = 1e-6  # of a mean load: margin for rounding and tolerances
+FEASIBLE = 1e-9  # HiGHS's tolerance for a linear programme, well inside the reserve
+_LOOSE = 2e-7  # HiGHS's tolerance for a mixed one, 1e-7, with some margin
 
-STILL_MOVE = 1e-9  # m, of a move; nobody makes a smaller one
+STILL_MOVE = 1e-9  # m: smaller moves count as none
 
-_EVEN = 1e-2  # of the least sum of squares, spent on smaller moves
+_EVEN = 1e-2  # of the least sum of squares, traded for smaller moves
 
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """A bound that keeps a calibration from meeting every limit.
+    """A bound that prevents a calibration from meeting every limit.
 
     Attributes
     ----------
     bearing : str
     condition : str
-        Empty for the bound of a move, which holds in all.
+        Empty for the bound of a move, which applies to all conditions.
     quantity : str
         "move" [m], "reaction" [N], "mean pressure" [Pa], "slope" [rad], or "contact".
     bound : float
     upper : bool
-        True where the quantity must not be more, False where it must not be less.
+        True for an upper, False for a lower bound.
     needed : float
-        Where the bound would have to be; NaN where it stands against the others but need not
-        give itself.
+        Required value of the bound; NaN if it conflicts with others but need not change
+        itself.
     """
 
     bearing: str
@@ -64,7 +64,7 @@ class Block:
 
     @property
     def text(self) -> str:
-        """In words."""
+        """Description in words."""
         where = f"bearing '{self.bearing}'" + (f", {self.condition}" if self.condition else "")
         if self.quantity == "contact":
             return f"{where}: it cannot pull"
@@ -80,19 +80,19 @@ class Block:
 class _Response:
     """A condition with all points in contact, affine in x = (moves, turns, gaps).
 
-    Moves and gaps count in mm, a turn as the move of the bore's edge in mm. A point that lifts is
-    as if its seat stood higher by the gap.
+    Moves and gaps are in mm, a turn as the move of the bore's edge in mm. A point that lifts acts
+    as if its seat were higher by the gap.
     """
 
     state: LineState
     loads: Vector  # (p, 1 + 2 n + p), the constant first [N]
-    slopes: Vector  # (n, 1 + 2 n + p), against the bores [rad]
+    slopes: Vector  # relative to the bores [rad]
     widest: float  # bound of a gap [mm]
     whole: float  # sum of all reactions [N]
 
 
 def response_of(state: LineState) -> _Response:
-    """What a state of the line makes of moves and turns of its seats."""
+    """Response of a state of the line to moves and turns of its seats."""
     line, held = state.line, state.line.held
     dead, sag = held.carry(vertical_load(line, state.condition))
     heights = point_heights(line, state.condition)
@@ -121,16 +121,16 @@ def response_of(state: LineState) -> _Response:
 
 
 def _edges(line: AlignmentLine) -> Vector:
-    """Lever of a turn: half the bore, or a metre where its length is not given [m]."""
+    """Lever of a turn: half the bore, or a metre if its length is not given [m]."""
     return np.array([seat.length / 2 or 1.0 for seat in line.seats])
 
 
 def _widest_gap(state: LineState, dead: Vector, heights: Vector) -> float:
-    """Bound of any gap that is looked for [mm].
+    """Bound of any gap in the search [mm].
 
-    A generous multiple of what could open one: the spread of the heights, the moves, and the sag
-    of the shaft where one point is taken away. A wider bound would let a switch that is 1e-6 off
-    a whole number pass a gap that matters.
+    A generous multiple of all that could open one: the spread of the heights, the moves, and the
+    sag of the shaft with one point removed. With a wider bound, a switch that is 1e-6 off
+    a whole number would allow a significant gap.
     """
     seats = state.line.seats
     sag = float((np.abs(dead) / np.diag(state.line.held.influence)).max())
@@ -151,9 +151,9 @@ class _Row:
 
 
 def _limit_row(row: Vector, now: float, unit: float, meaning: Block, elastic: bool) -> _Row:
-    """A limit as a row that must not be above its bound, with a little reserve.
+    """A limit as a row with an upper bound, with a small reserve.
 
-    What is met stays met: then the bound is no lower than where the row stands.
+    A limit that is met stays met: the bound is then not below the present value.
     """
     sign = 1.0 if meaning.upper else -1.0
     bound, now = sign * meaning.bound / unit, sign * now / unit
@@ -201,9 +201,9 @@ class MoveProgramme:
     bound: Vector
     least: Vector
     most: Vector
-    switch: NDArray[np.bool_]  # columns that must be whole
+    switch: NDArray[np.bool_]  # integer columns
     slack: NDArray[np.bool_]  # columns
-    meaning: tuple[Block | None, ...]  # of the rows; none for an elastic one
+    meaning: tuple[Block | None, ...]  # of the rows; None for an elastic one
     responses: tuple[_Response, ...]
 
     @property
@@ -217,7 +217,7 @@ class MoveProgramme:
 def programme_of(
     line: AlignmentLine, before: Sequence[LineState], *, elastic: bool
 ) -> MoveProgramme:
-    """Rows and columns of a calibration in all conditions at once, its limits elastic or not."""
+    """Rows and columns of a calibration in all conditions together, with elastic limits or not."""
     n, p, m = len(line.seats), line.held.stations.size, len(before)
     responses = tuple(response_of(state) for state in before)
     unit = float(np.mean([state.reactions for state in before]))
@@ -254,7 +254,7 @@ def programme_of(
 
 
 def _spread(row: Vector, n: int, p: int, c: int, size: int) -> Vector:
-    """Row over moves, turns and gaps of condition c, over all columns."""
+    """Spread a row over moves, turns and gaps of condition c to all columns."""
     full = np.zeros(size)
     full[:n], full[n : 2 * n] = row[:n], -row[:n]
     full[2 * n : 3 * n], full[3 * n : 4 * n] = row[n : 2 * n], -row[n : 2 * n]
@@ -266,7 +266,7 @@ def _spread(row: Vector, n: int, p: int, c: int, size: int) -> Vector:
 def _contact_rows(
     response: _Response, unit: float, c: int, size: int
 ) -> tuple[list[Vector], list[float]]:
-    """For each point: it does not pull, off contact it carries nothing, in contact no gap."""
+    """Rows for each point: no tension, no load without contact, no gap in contact."""
     p = response.loads.shape[0]
     n = len(response.state.line.seats)
     rows, bounds = [], []
@@ -323,7 +323,7 @@ def _columns(
 
 
 def _may_lift(state: LineState, elastic: bool) -> NDArray[np.bool_]:
-    """Seats any of whose points may lift: those that need no load, or have others to carry it."""
+    """Seats with points that may lift: those that need no load, or have others to carry it."""
     return np.array(
         [
             seat.points > 1
@@ -337,7 +337,7 @@ def _may_lift(state: LineState, elastic: bool) -> NDArray[np.bool_]:
 def least_moves(
     line: AlignmentLine, before: Sequence[LineState], prefer: str, seconds: float
 ) -> MoveSolution | None:
-    """The moves that bring every limit, or None."""
+    """Least moves that meet every limit, or None."""
     programme = programme_of(line, before, elastic=False)
     if prefer == "fewest":
         programme, count = _counting(programme)
@@ -352,7 +352,7 @@ def least_moves(
 def even_moves(
     line: AlignmentLine, before: Sequence[LineState], seconds: float
 ) -> MoveSolution | None:
-    """The moves that keep every limit with reactions nearest to their mean, or None."""
+    """Moves that keep every limit with reactions nearest to their mean, or None."""
     programme, apart = _evening(programme_of(line, before, elastic=False))
     settled, best = optimum_of(programme, apart, seconds)
     if best is None:
@@ -361,9 +361,9 @@ def even_moves(
 
 
 def _evening(programme: MoveProgramme) -> tuple[MoveProgramme, Vector]:
-    """With a column above the square of each reaction's distance from the mean, and their sum.
+    """Add a column for each reaction's squared difference from the mean; and the cost of their sum.
 
-    A column lies above tangents of the parabola: a linear programme knows no squares.
+    A column is bounded from below by tangents of the parabola, to keep the programme linear.
     """
     n, p, size = programme.n, programme.responses[0].loads.shape[0], programme.least.size
     count = n * len(programme.responses)
@@ -388,13 +388,13 @@ def _evening(programme: MoveProgramme) -> tuple[MoveProgramme, Vector]:
 
 
 _TANGENTS = np.concatenate([side * np.geomspace(0.02, 4.0, 16) for side in (-1, 1)])
-"""Distances from the mean reaction, over it, where the tangents touch."""
+"""Differences from the mean reaction, over the mean, at the points of tangency."""
 
 
 def nearest_moves(
     line: AlignmentLine, before: Sequence[LineState], seconds: float
 ) -> MoveSolution | None:
-    """The moves that bring the unmet limits nearest; None without an answer."""
+    """Moves that come closest to the unmet limits; None without a solution."""
     programme = programme_of(line, before, elastic=True)
     violation = programme.slack.astype(float)
     settled, best = optimum_of(programme, violation, seconds)
@@ -404,7 +404,7 @@ def nearest_moves(
 
 
 def optimum_of(programme: MoveProgramme, cost: Vector, seconds: float) -> tuple[MoveProgramme, Any]:
-    """The programme with its switches settled, and its solution or None."""
+    """Programme with fixed switches, and its solution or None."""
     found = _solve(programme, cost, seconds)
     if found is None:
         return programme, None
@@ -430,7 +430,7 @@ def _solve(programme: MoveProgramme, cost: Vector, seconds: float) -> Any:
 
 
 def _settled(programme: MoveProgramme, cost: Vector, x: Vector, seconds: float) -> MoveProgramme:
-    """With the switches as found, no longer mixed; loose where they only fit to tolerance."""
+    """Fix the switches as found; loosen rows that they satisfy only to tolerance."""
     least, most = programme.least.copy(), programme.most.copy()
     least[programme.switch] = most[programme.switch] = np.round(x[programme.switch])
     switch = np.zeros_like(programme.switch)
@@ -450,7 +450,7 @@ def _capped(programme: MoveProgramme, cost: Vector, most: float) -> MoveProgramm
 
 
 def widened(programme: MoveProgramme, n: int, most: float, whole: bool) -> MoveProgramme:
-    """With n columns more."""
+    """Add n columns."""
     return replace(
         programme,
         matrix=np.hstack([programme.matrix, np.zeros((programme.bound.size, n))]),
@@ -462,7 +462,7 @@ def widened(programme: MoveProgramme, n: int, most: float, whole: bool) -> MoveP
 
 
 def _travel(programme: MoveProgramme) -> Vector:
-    """(n, columns): how far each bearing moves, with the turn of its edge."""
+    """Matrix (n, columns) of each bearing's travel, including the turn of its edge."""
     eye = np.eye(programme.n)
     travel = np.zeros((programme.n, programme.least.size))
     travel[:, : 4 * programme.n] = np.hstack([eye, eye, eye, eye])
@@ -470,7 +470,7 @@ def _travel(programme: MoveProgramme) -> Vector:
 
 
 def _counting(programme: MoveProgramme) -> tuple[MoveProgramme, Vector]:
-    """With a switch for each bearing that moves, and the cost that counts them."""
+    """Add a switch for each bearing that moves, and the cost that counts them."""
     n, size = programme.n, programme.least.size
     wide = widened(programme, n, 1.0, whole=True)
     rows = _travel(wide)
@@ -485,7 +485,7 @@ def _counting(programme: MoveProgramme) -> tuple[MoveProgramme, Vector]:
 
 
 def _smallest(settled: MoveProgramme, seconds: float) -> MoveSolution | None:
-    """Least sum of moves, and of those the least largest move."""
+    """Least sum of moves, and among those the least largest move."""
     found = _solve(settled, settled.moving, seconds)
     if found is None:
         return None
@@ -505,7 +505,7 @@ def _smallest(settled: MoveProgramme, seconds: float) -> MoveSolution | None:
 
 
 def solution_of(programme: MoveProgramme, x: Vector) -> MoveSolution:
-    """Moves, turns and promised reactions of a programme's answer."""
+    """Moves, turns and expected reactions of a programme's solution."""
     n, p = programme.n, programme.responses[0].loads.shape[0]
     line = programme.responses[0].state.line
     up, down, turn_up, turn_down = x[: 4 * n].reshape(4, n)

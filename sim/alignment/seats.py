@@ -1,4 +1,4 @@
-"""Seats of a shaft line: where its bearings are, and what is refused of them."""
+"""Seats of a shaft line: its bearings, and checks of them."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -9,43 +9,43 @@ import numpy as np
 from ..beam.beam import Beam
 
 _MOST_POINTS = 100  # of one seat
-FEWEST_POINTS = 2  # points that a shaft can rest on
+FEWEST_POINTS = 2  # points that a shaft needs to rest on
 
 
 class AlignmentError(ValueError):
-    """A line of bearings that cannot be, or a question that has no answer on it."""
+    """An impossible line of bearings, or a problem without a solution on it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seat:
-    """A bearing as the alignment sees it.
+    """A bearing in the alignment model.
 
     Attributes
     ----------
     name : str
     station : float
-        Of the middle of the bearing [m].
+        Position of the middle of the bearing [m].
     offset : float
         Height of the bottom of the bore there [m].
     slope : float
-        Of the bore, against the line of reference [rad]: slope boring.
+        Slope of the bore relative to the line of reference [rad]: slope boring.
     stiffness : float
-        Of the whole bearing with its foundation [N/m], > 0; infinite where it does not yield.
+        Stiffness of the whole bearing with its foundation [N/m], > 0; infinite if rigid.
     length, diameter : float
-        Of the bearing [m], both > 0 for a mean pressure; the length also for several points.
+        Size of the bearing [m], both > 0 for a mean pressure; the length also for several points.
     points : int
-        Support points, each in the middle of its share of the length, with its share of the
-        stiffness.
+        Number of support points, each in the middle of its share of the length, with its share of
+        the stiffness.
     least_load, most_load : float
         Limits of the reaction [N].
     most_pressure : float
         Limit of the mean pressure on the projected area [Pa].
     most_slope : float
-        Limit of the slope of the shaft against the bore, either way [rad].
+        Limit of the slope of the shaft relative to the bore, in both directions [rad].
     least_move, most_move : float
-        How far the bearing may be lowered (<= 0) and raised (>= 0) [m].
+        Allowed lowering (<= 0) and raising (>= 0) of the bearing [m].
     least_turn, most_turn : float
-        How far the bore may be turned (<= 0, >= 0) [rad].
+        Allowed turn of the bore (<= 0, >= 0) [rad].
     """
 
     name: str
@@ -67,25 +67,25 @@ class Seat:
 
     @property
     def area(self) -> float:
-        """Projected [m^2]; zero where the bearing's size is not given."""
+        """Projected area [m^2]; zero if the bearing's size is not given."""
         return self.length * self.diameter
 
     @property
     def highest_load(self) -> float:
-        """What the limits of load and of mean pressure leave [N]."""
+        """Largest load by the limits of load and of mean pressure [N]."""
         if not math.isfinite(self.most_pressure):
             return self.most_load
         return min(self.most_load, self.most_pressure * self.area)
 
     @property
     def point_stations(self) -> tuple[float, ...]:
-        """Of the support points, from aft [m]."""
+        """Stations of the support points, from aft [m]."""
         share = self.length / self.points
         return tuple(self.station + (k - (self.points - 1) / 2) * share for k in range(self.points))
 
 
 def seat_stations(seats: Iterable[Seat]) -> tuple[float, ...]:
-    """Where the beam must have nodes: the middle and the support points of every seat.
+    """Stations where the beam needs nodes: the middle and the support points of every seat.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def seat_stations(seats: Iterable[Seat]) -> tuple[float, ...]:
 
 
 def line_faults(beam: Beam, seats: Sequence[Seat]) -> Iterator[str]:
-    """What is wrong with the seats of a line, all of it."""
+    """All faults of the seats of a line, as sentences."""
     names = [seat.name for seat in seats]
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         yield f"bearing '{name}' is given {names.count(name)} times, must be once; rename one"
@@ -123,7 +123,7 @@ def _seat_faults(beam: Beam, seat: Seat) -> Iterator[str]:
             yield f"{place}: {key} = {value} must be finite; give a number"
     yield from (f"{place}: {fault}" for fault in _range_faults(seat))
     if not 1 <= seat.points <= _MOST_POINTS:
-        yield f"{place}: points = {seat.points} must be from 1 to {_MOST_POINTS}; about 10 will do"
+        yield f"{place}: points = {seat.points} must be from 1 to {_MOST_POINTS}; 10 are enough"
     elif seat.points > 1 and not seat.length > 0:
         yield f"{place}: length = {seat.length:g} m must be > 0 with several points; give it"
     else:
@@ -146,7 +146,7 @@ def _range_faults(seat: Seat) -> Iterator[str]:
     elif not seat.highest_load >= seat.least_load:
         yield (
             f"most_load with most_pressure = {seat.highest_load:g} N must be >= least_load = "
-            f"{seat.least_load:g} N; mend one of the limits"
+            f"{seat.least_load:g} N; correct one of the limits"
         )
     if not seat.most_slope > 0:
         yield f"most_slope = {seat.most_slope:g} rad must be > 0; leave it out for none"
@@ -156,7 +156,7 @@ def _range_faults(seat: Seat) -> Iterator[str]:
         ):
             yield (
                 f"{low} = {getattr(seat, low):g} and {high} = {getattr(seat, high):g} must be "
-                "<= 0 and >= 0 and finite; zero where the bearing stays"
+                "<= 0 and >= 0 and finite; zero for a fixed bearing"
             )
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..parts.units import STANDARD_GRAVITY
 from ..scene.pump_hydraulics import (
-    BREATHING_RUNGS,
+    CHAMBER_RUNGS,
     PIPED_RUNGS,
     STANDARD_ATMOSPHERE,
     CylinderPressure,
@@ -27,7 +27,7 @@ PRESSURE_CODES = {
     "constant": PRESSURE_CONSTANT,
     "two-level": PRESSURE_TWO_LEVEL,
     "heads": PRESSURE_HEADS,
-    **dict.fromkeys(BREATHING_RUNGS, PRESSURE_CHAMBER),
+    **dict.fromkeys(CHAMBER_RUNGS, PRESSURE_CHAMBER),
 }
 """Rung of the scene -> code of the kernels, from the cheapest to the best; pipes are told apart."""
 

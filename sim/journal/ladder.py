@@ -1,4 +1,4 @@
-"""Rungs of a journal bearing, from the cheapest to the best, and what a run of it costs."""
+"""Rungs of a journal bearing, from the cheapest to the best, and the cost of a run."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ FILM_LADDER = tuple(
 """Rungs of an oil film that a scene may choose."""
 
 FINE_LEVELS = (4.0, 2.0, 1.0, 0.5)
-"""Factors on a mesh width of an orbit's film, or the steps of an adaptive integrator."""
+"""Factors on the mesh width of an orbit's film, or on an adaptive integrator's steps."""
 
 
 def journal_effects(scene: Scene) -> Iterator[Effect]:
@@ -61,7 +61,7 @@ def _mesh_effect(scene: Scene) -> Iterator[Effect]:
 def mesh_values(
     film: Film, factor: float, *, along: float | None = None
 ) -> Mapping[str, Any] | None:
-    """Nodes of a mesh so many times as wide: cells divide evenly, a node stays in the middle."""
+    """Nodes of a mesh with scaled spacing: cells divide evenly, a node stays in the middle."""
     round_, over = film.n_theta / factor, (film.n_z - 1) / (along or factor)
     if round_ % 1 or over % 2 or round_ < _FEWEST_ROUND or over < _FEWEST_OVER:
         return None
@@ -77,7 +77,7 @@ def _integrator_effect(scene: Scene) -> Iterator[Effect]:
     if numerics.integrator == "adaptive":
 
         def tolerance(factor: float) -> Mapping[str, Any] | None:
-            # error of a step goes with its fourth power: so steps have the factor's length
+            # a step's error is of fourth order, so that steps scale with the factor
             value = numerics.tolerance * factor**4
             return {"numerics.tolerance": value} if 1e-12 <= value <= 1e-2 else None
 
@@ -91,22 +91,23 @@ def _integrator_effect(scene: Scene) -> Iterator[Effect]:
 
 # --- cost
 
-_MESH = 72, 17  # on which a solve is tabulated
+_MESH = 72, 17  # mesh of the tabulated solve
 
 _CALLS_PER_STEP = {"euler": 1, "rk4": 4, "adaptive": 10}
 
 _STEPS_PER_CYCLE = 11.0
-"""Of the fastest force, with the adaptive integrator at this tolerance, in the mean of scenes."""
+"""Step over the time constant of the fastest force, for the adaptive integrator at this tolerance,
+averaged over scenes."""
 
 _TOLERANCE = 1e-5
 
-_MAP_SHARE = 2.5 * 96 * 97 / 100  # solves of a map's table, cold, shared by a hundred records
+_MAP_SHARE = 2.5 * 96 * 97 / 100  # cold solves for a map's table, shared by a hundred records
 
-_SAMPLE = 90.0  # ns of one sample of one recording of an orbit
+_SAMPLE = 90.0  # ns per sample of an orbit's recording
 
 
 def journal_calls(scene: JournalScene) -> float:
-    """Solves of the film that a run is expected to ask for."""
+    """Expected number of film evaluations of a run."""
     turns = scene.duration * scene.drive.speed + scene.settling_revolutions
     numerics = scene.numerics
     if numerics.integrator == "adaptive":
@@ -121,7 +122,7 @@ def journal_calls(scene: JournalScene) -> float:
 def solve_time(film: Film, band: float) -> float:
     """Time of a direct solve over that of the tabulated mesh; `band` is the share of the fill.
 
-    Every node costs by itself, and by the square of those across the band of the matrix.
+    The cost has a part per node, and one with the square of the nodes across the matrix band.
     """
 
     def time(n_theta: int, n_z: int) -> float:
@@ -130,7 +131,7 @@ def solve_time(film: Film, band: float) -> float:
     return time(film.n_theta, film.n_z) / time(*_MESH)
 
 
-_BAND = 0.28  # of a tabulated solve that is symmetric and starts from the last
+_BAND = 0.28  # of a tabulated solve that is symmetric and starts from the last one
 
 
 def journal_cost(scene: Scene) -> float:

@@ -1,4 +1,4 @@
-"""Load of a journal over time: constant, turning, repeated with the shaft, or a history."""
+"""Load of a journal over time: constant, rotating, periodic with the shaft, or a history."""
 
 import math
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from ..jit import kernel, sine_cosine
 
 
 class Load(NamedTuple):
-    """Everything that pushes the journal, over M C omega^2, and alpha."""
+    """All loads on the journal, over M C omega^2, and alpha."""
 
     alpha: float
     static_x: float
@@ -44,26 +44,26 @@ def load(
     static : tuple of float
         Constant part along X and Y, over M C omega^2: weight and static load.
     unbalance : float
-        Eccentricity of the mass over C, >= 0; its force turns with the shaft.
+        Eccentricity of the mass over C, >= 0; its force rotates with the shaft.
     phase : float
         Its angle from X at tau = 0 [rad].
     time : array_like [shape=(n,)], optional
-        Instants of the history [rad], not falling; one that stands twice is a jump. Before the
-        first and after the last the history keeps their value.
+        Instants of the history [rad], in rising order; a repeated instant is a jump. Before the
+        first and after the last the history is constant.
     history : array_like [shape=(n, 2)], optional
         Load along X and Y at those instants, linear between them.
     orders : array_like [shape=(n, 4)], optional
-        Loads that repeat: cycles per revolution, phase at tau = 0 [rad], peaks along X and Y.
+        Periodic loads: cycles per revolution, phase at tau = 0 [rad], peaks along X and Y.
 
     Returns
     -------
     Load
-        For :func:`run_orbit` and :func:`.mass_orbit.mass_orbit`.
+        Argument of :func:`run_orbit` and :func:`.mass_orbit.mass_orbit`.
 
     Raises
     ------
     ValueError
-        With everything that is wrong.
+        All faults of the arguments together.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def load(
     if not alpha > 0 or not math.isfinite(alpha):
         wrong.append(f"alpha = {alpha:g} must be > 0 and finite; without a film use no_film()")
     if not unbalance >= 0:
-        wrong.append(f"unbalance = {unbalance:g} must be >= 0; turn it by its phase")
+        wrong.append(f"unbalance = {unbalance:g} must be >= 0; reverse it by its phase")
     if (time is None) != (history is None):
         wrong.append("time and history must both be given, or neither")
     if values.shape != (len(instants), 2):
@@ -100,7 +100,7 @@ def load(
 
 
 def step_history(start: float, size: tuple[float, float]) -> dict[str, NDArray[np.float64]]:
-    """History for :func:`load`: nothing, from `start` [rad] on `size`."""
+    """History for :func:`load`: zero, then `size` from `start` [rad] on."""
     return {
         "time": np.array([start, start]),
         "history": np.array([(0.0, 0.0), size]),
@@ -110,7 +110,7 @@ def step_history(start: float, size: tuple[float, float]) -> dict[str, NDArray[n
 def rectangular_history(
     start: float, end: float, size: tuple[float, float]
 ) -> dict[str, NDArray[np.float64]]:
-    """History for :func:`load`: `size` from `start` to `end` [rad], nothing before and after."""
+    """History for :func:`load`: `size` from `start` to `end` [rad], else zero."""
     return {
         "time": np.array([start, start, end, end]),
         "history": np.array([(0.0, 0.0), size, size, (0.0, 0.0)]),
@@ -120,10 +120,10 @@ def rectangular_history(
 def half_sine_history(
     start: float, end: float, size: tuple[float, float], n: int = 257
 ) -> dict[str, NDArray[np.float64]]:
-    """History for :func:`load`: half a sine of that peak from `start` to `end` [rad].
+    """History for :func:`load`: half a sine with that peak from `start` to `end` [rad].
 
-    Sampled at n instants: straight lines miss the sine by ``(pi / (n - 1))^2 / 8`` of its peak,
-    2e-5 as it is.
+    Sampled at n instants: linear interpolation misses the sine by ``(pi / (n - 1))^2 / 8`` of its
+    peak, 2e-5 by default.
     """
     share = np.linspace(0.0, 1.0, n)
     return {
@@ -134,7 +134,7 @@ def half_sine_history(
 
 @kernel
 def _interval(time: Any, tau: float, first: int) -> int:
-    """Last instant not after tau, looked for from `first` on; -1 before all."""
+    """Index of the last instant not after tau, searched from `first` on; -1 before all."""
     n = first
     while n >= 0 and time[n] > tau:
         n -= 1

@@ -1,14 +1,14 @@
-"""A journal in a film that keeps its mass: the oil that the film has now is what was left to it.
+"""Journal in a mass-conserving film: the oil in the film depends on its history.
 
-A force map knows the journal's place and velocity alone. The film here remembers: where it has
-ruptured it is filled in part, oil that an end or a groove feeds takes time to fill it, and until
+A force map depends only on the journal's position and velocity. This film has a memory: ruptured
+parts are partly filled, oil from an end or a groove takes time to fill them, and until
 then the gap carries less. The march is implicit in journal and film alike,
 
     X1 = X0 + h V1,   V1 = V0 + h (alpha F(X1, oil0) + q(tau1)),
 
 with F from :func:`.film.mass_conserving.mass_step` over the same step h, so that no squeeze
-stiffness bounds the step. The place is found by Broyden's method; its Jacobian is kept from step to
-step and taken anew by differences where it no longer serves.
+stiffness limits the step. The position is found by Broyden's method; its Jacobian is kept from step
+to step and computed anew by differences when convergence is poor.
 
 Source of the problem: Ausas, Jai, Buscaglia (2009), J. Tribology 131(3), 031702. The coupled step
 is derived here.
@@ -26,9 +26,9 @@ from ..film.solve import FilmGeometry, FilmSolution, FilmState
 from .load import Load, load_at
 from .orbit_status import OrbitStatus
 
-_SETTLED = 1e-7  # of the gap that is left: what the place at the end of a step may be off by
-_MOST_TRIALS = 40  # films of one step
-_STALE = 8  # trials after which the Jacobian is taken anew
+_SETTLED = 1e-7  # of the remaining gap: tolerance of the position at the end of a step
+_MOST_TRIALS = 40  # film solutions per step
+_STALE = 8  # trials after which the Jacobian is computed anew
 _MOST_CLOSED = 0.7  # of the gap, from one trial to the next
 _LEAST_GAP = 1e-6  # over C: far below the roughness of any bearing
 _SPACING = 1e-5  # of the gap: spacing of a difference quotient
@@ -36,7 +36,7 @@ _SPACING = 1e-5  # of the gap: spacing of a difference quotient
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MassOrbit:
-    """Path of a journal in a film that keeps its mass.
+    """Path of a journal in a mass-conserving film.
 
     Attributes
     ----------
@@ -51,9 +51,9 @@ class MassOrbit:
     filled : numpy.ndarray [shape=(n,)]
         Volume of oil over that of the gap.
     status : OrbitStatus
-        How the run ended; cut off there where it is not OK.
+        How the run ended; the path ends there if it is not OK.
     films : int
-        Films solved.
+        Number of film solutions.
     """
 
     tau: NDArray[np.float64]
@@ -75,7 +75,7 @@ class MassOrbit:
 
 @dataclass(kw_only=True)
 class _March:
-    """Where journal and film are, and what the next step begins with."""
+    """State of journal and film, and the starting point of the next step."""
 
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
@@ -96,7 +96,7 @@ def mass_orbit(
     fill: float = 1.0,
     end_pressure: EndPressure = 0.0,
 ) -> MassOrbit:
-    """Path of a journal under its load in a film that keeps its mass.
+    """Path of a journal under its load in a mass-conserving film.
 
     Parameters
     ----------
@@ -104,13 +104,13 @@ def mass_orbit(
         As in :func:`.film.mass_conserving.mass_step`; its condition must be ``"periodic"`` or
         ``"reynolds"``.
     q : Load
-        Of :func:`.orbit.load`.
+        From :func:`.orbit.load`.
     duration : float
-        [rad], >= 0.
+        Shaft angle [rad], >= 0.
     step : float
-        [rad], > 0. The method is of first order in it.
+        Shaft angle [rad], > 0. The method is of first order in the step.
     start, start_velocity : tuple of float
-        Place of the journal over C, inside the clearance, and its rates by tau.
+        Position of the journal over C, inside the clearance, and its rates by tau.
     fill : float
         Film fraction of the whole gap at the start, in [0, 1].
     end_pressure : float or (float, float)
@@ -119,12 +119,12 @@ def mass_orbit(
     Returns
     -------
     MassOrbit
-        Every instant up to the end, or up to where its status says.
+        Path to the end, or as far as its status indicates.
 
     Raises
     ------
     ValueError
-        With everything that is wrong with the arguments.
+        All faults of the arguments together.
 
     References
     ----------
@@ -199,7 +199,7 @@ def _step(
     end_pressure: EndPressure,
     row: NDArray[np.float64],
 ) -> OrbitStatus:
-    """Carry journal and film over one step; fills the row of its end."""
+    """Take one step of journal and film; fill the row of its end."""
     coast = now.position + h * now.velocity + h * h * np.array(load_at(q, tau))
     place, miss, after = now.position.copy(), np.zeros(2), None
     trial, age = now.position + _held_back(now.position, h * now.velocity), 0
@@ -244,7 +244,7 @@ def _step(
 
 
 def _held_back(place: NDArray[np.float64], move: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A move that leaves some of the gap."""
+    """Limit a move so that some of the gap remains."""
     gap = 1.0 - math.hypot(*place)
     share = 1.0
     while 1.0 - math.hypot(*(place + share * move)) < (1.0 - _MOST_CLOSED) * gap:

@@ -1,20 +1,20 @@
-"""A journal of one mass in its oil film: the time march, for every film that gives a force.
+"""Time march of a journal, as a single mass, in any oil film that has a force.
 
 With lengths over the radial clearance C and time ``tau = omega t``,
 
     X'' = alpha F_X + q_X(tau),  Y'' = alpha F_Y + q_Y(tau),  alpha = eta R^3 L / (M C^3 omega),
 
 where F is the film's non-dimensional force and q the load over ``M C omega^2``: a constant (weight
-``g / (C omega^2)`` and static load), an unbalance that turns with the shaft (``u`` is the
+``g / (C omega^2)`` and static load), an unbalance that rotates with the shaft (``u`` is the
 eccentricity of the mass over C), and any history of time. The film is chosen by an integer code;
 a wall may be added, a contact law that takes over where the film ends.
 
 Three integrators. *euler*: velocity first, then position with the new velocity, at a fixed step,
 as in the source paper (first order). *rk4*: the classical fourth-order method at a fixed step.
 *adaptive*: the Rosenbrock method RODAS, order 4 with an embedded third, L-stable and stiffly
-accurate, with a step that follows the error. The film is a damper whose strength grows with
-``(1 - eccentricity)^(-5/2)``: an explicit step is bound by it wherever the journal comes near the
-wall, and a run that breaks the bound ends with a status.
+accurate, with an error-controlled step. The film is a damper whose strength grows with
+``(1 - eccentricity)^(-5/2)``: it limits an explicit step wherever the journal comes near the
+wall, and a run that violates the limit ends with a status.
 
 Sources: Ma, Lu, Chen (2010), J. Vibration, Measurement & Diagnosis 30(1), 7-10; Hairer, Wanner
 (1996), Solving Ordinary Differential Equations II, section IV.10 (RODAS and its coefficients).
@@ -54,9 +54,9 @@ _STABLE = (2.0, 2.785, math.inf)  # step times damping, on the negative real axi
 
 
 def _safe_eccentricity(film: OrbitFilm, alpha: float, step: float, stable: float) -> float:
-    """Eccentricity up to which a fixed step is stable in any case; beyond, the march asks.
+    """Eccentricity up to which a fixed step is always stable; beyond it the march checks.
 
-    The short film damps more than any other of its length, by at most the squeeze of a full circle:
+    The short film has the largest damping for its length, at most the squeeze of a full circle:
     ``4 (L/D)^2`` times the integral of ``cos^2 / H^3``, ``pi (1 + 2 eps^2) / (1 - eps^2)^2.5``.
     """
     if film.code == FILM_NONE:
@@ -79,11 +79,11 @@ class OrbitRun:
     position, velocity : numpy.ndarray [shape=(n, 2)]
         Journal centre along X and Y over C, and its rates by tau.
     status : OrbitStatus
-        How the run ended; cut off there where it is not OK.
+        How the run ended; the path ends there if it is not OK.
     end : float
-        tau reached.
+        Last value of tau.
     steps, rejected, calls : int
-        Steps taken, adaptive steps tried in vain, evaluations of the film.
+        Steps taken, adaptive steps rejected, evaluations of the film.
     """
 
     tau: NDArray[np.float64]
@@ -120,26 +120,27 @@ def run_orbit(
     Parameters
     ----------
     film : Film
-        Of :func:`short_film`, :func:`map_film`, :func:`solved_film` or :func:`no_film`.
+        From :func:`short_film`, :func:`map_film`, :func:`solved_film` or :func:`no_film`.
     q : Load
-        Of :func:`load`.
+        From :func:`load`.
     duration : float
-        [rad]; the last sample lies at the last multiple of `sample_step` within.
+        Shaft angle [rad]; the last sample is at the last multiple of `sample_step` within.
     start, start_velocity : tuple of float
-        Place of the journal over C, rates by tau.
+        Position of the journal over C, and its rates by tau.
     integrator : str
         One of :data:`INTEGRATORS`.
     step : float
         Fixed step, or the first of the adaptive integrator [rad].
     sample_step : float, optional
-        Of the samples kept [rad]; by default `step`. A fixed step is shortened until it divides it.
+        Interval of the samples kept [rad]; by default `step`. A fixed step is shortened to divide
+        it.
     tolerance : float
-        Of one adaptive step: error of the position over the gap that is left, of the rates over gap
-        plus speed.
+        Tolerance of one adaptive step: error of the position over the remaining gap, of the rates
+        over gap plus speed.
     max_steps : int
-        Most adaptive steps.
+        Largest number of adaptive steps.
     wall : Wall, optional
-        Contact law at the wall; without, the run ends there.
+        Contact law at the wall; without it, the run ends there.
 
     Returns
     -------
@@ -148,7 +149,7 @@ def run_orbit(
     Raises
     ------
     ValueError
-        With everything that is wrong with the arguments.
+        All faults of the arguments together.
 
     Examples
     --------
@@ -214,9 +215,9 @@ def _check_run(
 
 
 def _overloaded(film: OrbitFilm, q: Load, state: NDArray[np.float64], tau: float) -> bool:
-    """Whether the load is, now and in the end, more than the turning film carries at its edge.
+    """Whether the load exceeds, now and finally, the capacity of the film at its last eccentricity.
 
-    Unbalance and orders do not count: they pass.
+    Unbalance and orders are ignored, as they average out.
     """
     if film.code == FILM_NONE:
         return False
@@ -244,14 +245,14 @@ def _trace(film: OrbitFilm, states: Any, trace: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FilmTrace:
-    """What the film did along a run.
+    """Film force and pressure along a run.
 
     Attributes
     ----------
     force : numpy.ndarray [shape=(n, 2)]
         Non-dimensional F on the journal.
     peak_pressure : numpy.ndarray [shape=(n,)] or None
-        Largest non-dimensional P; None for films that know none.
+        Largest non-dimensional P; None for films without a pressure.
     """
 
     force: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Films behind an integer code, and their force on the journal."""
+"""Films identified by an integer code, and their force on the journal."""
 
 import math
 from typing import NamedTuple
@@ -17,7 +17,7 @@ FILM_NONE, FILM_SHORT, FILM_MAP, FILM_DIRECT = range(4)
 
 
 class OrbitFilm(NamedTuple):
-    """A film behind an integer code; parts that the code does not use are empty."""
+    """Film identified by an integer code; parts that the code does not use are empty."""
 
     code: int  # FILM_*
     length_to_diameter: float
@@ -34,7 +34,7 @@ def _no_work() -> DirectFilm:
 
 
 def no_film() -> OrbitFilm:
-    """No film at all: the absent effect."""
+    """No film: the effect is absent."""
     return OrbitFilm(FILM_NONE, 1.0, math.inf, _NO_TABLE, _no_work())
 
 
@@ -44,24 +44,24 @@ def short_film(length_to_diameter: float, *, last_eccentricity: float = 0.9999) 
     Parameters
     ----------
     length_to_diameter : float
-        L / D; the form overstates the force of bearings longer than about 1/2.
+        L / D; the formula overestimates the force of bearings longer than about 1/2.
     last_eccentricity : float
-        Where a run ends with a status, < 1.
+        End of the film, < 1; a run ends there with a status.
     """
     return OrbitFilm(FILM_SHORT, length_to_diameter, last_eccentricity, _NO_TABLE, _no_work())
 
 
 def map_film(impedance: ImpedanceMap, length_to_diameter: float) -> OrbitFilm:
-    """Film of an impedance map of a bearing of that L / D."""
+    """Film from an impedance map of a bearing with that L / D."""
     return OrbitFilm(
         FILM_MAP, length_to_diameter, impedance.last_eccentricity, impedance.table, _no_work()
     )
 
 
 def solved_film(geometry: FilmGeometry, *, last_eccentricity: float = 0.995) -> OrbitFilm:
-    """Film solved anew at every call, started from the call before.
+    """Film solved at every call, starting from the last call.
 
-    The workspace belongs to this value: one run at a time.
+    The workspace belongs to this value, so use it in one run at a time.
     """
     return OrbitFilm(
         FILM_DIRECT,
@@ -78,8 +78,8 @@ def film_force(
 ) -> tuple[float, float]:
     """Force of any film.
 
-    Beyond its last eccentricity the journal is taken as at that: trial points of an integrator lie
-    there, and contact at a wall.
+    Beyond its last eccentricity the journal is moved back to it: this occurs at trial points of an
+    integrator, and in contact with a wall.
     """
     square = x * x + y * y
     if square > film.last_eccentricity * film.last_eccentricity:

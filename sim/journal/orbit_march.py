@@ -45,7 +45,7 @@ from .orbit_step import (
 )
 
 OVERLAP_LIMIT = 0.1  # of the clearance
-_EDGE = 1e-9  # about a jump of the load, on either side of which a stage stands [rad]
+_EDGE = 1e-9  # distance of a stage from a jump of the load [rad]
 _MOST_SPLITS = 40  # shortest adaptive step over the first: 2^-40
 
 
@@ -58,7 +58,7 @@ class Wall(NamedTuple):
 
 
 def no_wall() -> Wall:
-    """No wall: a journal that reaches it ends the run."""
+    """No wall: a run ends when the journal reaches it."""
     return Wall(0, np.zeros(1, CONTACT), 0.0)
 
 
@@ -78,7 +78,7 @@ def wall_force(
 
 
 class MarchSettings(NamedTuple):
-    """What a march is told."""
+    """Settings of a march."""
 
     method: int
     step: float  # fixed, or the first
@@ -86,15 +86,15 @@ class MarchSettings(NamedTuple):
     max_steps: int
     sample_step: float
     stable: float  # largest step times damping
-    safe: float  # eccentricity up to which it is kept in any case
+    safe: float  # eccentricity up to which that is always kept
 
 
-_MORE, _TAKEN = -2, -1  # what a call may say besides a status code
+_MORE, _TAKEN = -2, -1  # results of a call other than a status code
 
 
 @kernel
 def _acceleration(work: MarchWork, tau: float, film: OrbitFilm, q: Load, wall: Wall) -> None:
-    """Acceleration at the point, into work.rate with the load and its rates."""
+    """Acceleration at the point, stored in work.rate with the load and its rates."""
     x, y, u, v = work.y[POINT, 0], work.y[POINT, 1], work.y[POINT, 2], work.y[POINT, 3]
     f_x, f_y = film_force(film, x, y, u, v)
     if film.code == FILM_DIRECT:
@@ -111,7 +111,7 @@ def _acceleration(work: MarchWork, tau: float, film: OrbitFilm, q: Load, wall: W
 
 @kernel
 def _hermite(share: float, h: float, p: float, v: float, a: float, end: Any) -> Any:
-    """Quintic through place, rate and acceleration at both ends; place and rate at the share."""
+    """Position and rate at a share, by the quintic through both ends with two derivatives."""
     p1, v1, a1 = end
     d = p1 - p - h * (v + 0.5 * h * a)
     e = h * (v1 - v - h * a)
@@ -127,9 +127,9 @@ def _hermite(share: float, h: float, p: float, v: float, a: float, end: Any) -> 
 
 @kernel
 def _fill_samples(work: MarchWork, q: Load, sample_step: float, record: Any) -> None:
-    """Samples between the start of the last step and the state.
+    """Fill the samples between the start of the last step and the state.
 
-    The acceleration at the end is that before a jump of the load.
+    At a jump of the load, the acceleration at the end is that before the jump.
     """
     b, y, tau, sample = work.before, work.y, work.clock[TAU], work.counts[SAMPLE]
     if sample == 0:
@@ -153,7 +153,7 @@ def _fill_samples(work: MarchWork, q: Load, sample_step: float, record: Any) -> 
 
 @kernel
 def _next_jump(q: Load, tau: float) -> float:
-    """First jump of the history after tau; infinity where there is none."""
+    """First jump of the history after tau; infinity if there is none."""
     for n in range(q.time.size - 1):
         if q.time[n] > tau + _EDGE and q.time[n + 1] == q.time[n]:
             return float(q.time[n])
@@ -162,7 +162,7 @@ def _next_jump(q: Load, tau: float) -> float:
 
 @kernel
 def _hold_contact(work: MarchWork, wall: Wall) -> None:
-    """Remember the speed at which the wall was touched first."""
+    """Save the speed at first contact with the wall."""
     if wall.present == 0:
         return
     y = work.y
@@ -192,11 +192,11 @@ def _fault(work: MarchWork, film: OrbitFilm, wall: Wall) -> int:
 
 @kernel
 def _place(work: MarchWork, s: MarchSettings, t: Tableau) -> float:
-    """Put the point where the next call wants the acceleration; its instant.
+    """Set the point of the next acceleration call; return its instant.
 
-    Call 0 of a step stands at the state. Then the explicit stages come, or the four difference
-    quotients of the Jacobian and the other stages of RODAS. A fixed step that may be unstable asks
-    for two difference quotients after its stages.
+    Call 0 of a step is at the state. Then follow the explicit stages, or the four difference
+    quotients of the Jacobian and the other stages of RODAS. A fixed step that may be unstable adds
+    two difference quotients after its stages.
     """
     call, clock = work.counts[CALL], work.clock
     if s.method == ADAPTIVE and call > 4:
@@ -214,15 +214,15 @@ def _place(work: MarchWork, s: MarchSettings, t: Tableau) -> float:
 
 @kernel
 def _column(method: int, call: int) -> int:
-    """Coordinate along which a call takes a difference quotient; 2 and 3 are the rates."""
+    """Coordinate of a call's difference quotient; 2 and 3 are the rates."""
     return call - 1 if method == ADAPTIVE else call - (2 if method == RK4 else -1)
 
 
 @kernel
 def _begin_step(work: MarchWork, q: Load, s: MarchSettings, record: Any) -> int:
-    """After call 0: keep what it found, fill samples, see whether the run is over."""
+    """After call 0: save its result, fill samples, check whether the run is over."""
     counts, clock = work.counts, work.clock
-    if counts[FAILED] == 1:  # at a trial point it would not matter
+    if counts[FAILED] == 1:  # it would not matter at a trial point
         return 7
     for c in range(6):
         work.first[c] = work.rate[c]
@@ -247,7 +247,7 @@ def _begin_step(work: MarchWork, q: Load, s: MarchSettings, record: Any) -> int:
 
 @kernel
 def _fixed_call(work: MarchWork, s: MarchSettings) -> int:
-    """After a call of a fixed step: the stage, then the test of stability where it is due."""
+    """After a call of a fixed step: the stage, then the stability check if it is due."""
     call, y = work.counts[CALL], work.y
     stages = 4 if s.method == RK4 else 1
     work.counts[CALL] = call + 1
@@ -256,7 +256,7 @@ def _fixed_call(work: MarchWork, s: MarchSettings) -> int:
             keep_stage(work, call)
         if call < stages - 1:
             return _MORE
-        # at the centre too, where nothing is safe
+        # at the centre too, where no step is known to be safe
         if y[STATE, 0] ** 2 + y[STATE, 1] ** 2 >= s.safe * s.safe:
             return _MORE
     else:
@@ -274,7 +274,7 @@ def _fixed_call(work: MarchWork, s: MarchSettings) -> int:
 def _adaptive_call(
     work: MarchWork, film: OrbitFilm, wall: Wall, s: MarchSettings, t: Tableau
 ) -> int:
-    """After a call of an adaptive step: Jacobian, stages, and the verdict."""
+    """After a call of an adaptive step: Jacobian, stages, then acceptance or rejection."""
     call, clock = work.counts[CALL], work.clock
     work.counts[CALL] = call + 1
     if call <= 4:
@@ -291,7 +291,7 @@ def _adaptive_call(
     error = rodas_error(work, s.tolerance)
     x, y = work.y[POINT, 0], work.y[POINT, 1]
     beyond = wall.present == 0 and x * x + y * y > film.last_eccentricity**2
-    # a step that would leave the film is cut until it ends at its edge
+    # a step that would leave the film is shortened until it ends at its edge
     if error <= 1.0 and not (beyond and clock[ATTEMPT] > 1e-6 * s.step):
         _accept(work, error)
         return _TAKEN
@@ -309,11 +309,11 @@ def _adaptive_call(
 
 @kernel
 def _accept(work: MarchWork, error: float) -> None:
-    """Remember where the step began, go on, and choose the next step."""
+    """Save the start of the step, advance, and choose the next step."""
     clock, before = work.clock, work.before
     attempt = clock[ATTEMPT]
     grown = attempt * min(5.0, 0.9 * max(error, 1e-8) ** -0.25)
-    # a step cut short by a jump or the end says nothing against the one that was planned
+    # a step shortened by a jump or the end keeps the planned step
     clock[STEP] = max(grown, clock[STEP]) if attempt < clock[STEP] else grown
     before[0] = clock[TAU]
     for c in range(4):
@@ -326,10 +326,10 @@ def _accept(work: MarchWork, error: float) -> None:
 def march(
     film: OrbitFilm, q: Load, wall: Wall, s: MarchSettings, t: Tableau, work: MarchWork, record: Any
 ) -> int:
-    """March to the last sample; status code.
+    """March to the last sample; return the status code.
 
     All integrators share one loop with one call of the acceleration, so that the film is compiled
-    into it once.
+    into it only once.
     """
     work.clock[STEP] = s.step
     work.clock[JUMP] = _next_jump(q, -1.0)

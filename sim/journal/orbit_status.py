@@ -4,14 +4,14 @@ from ..output.status import Ending
 
 
 class OrbitStatus(Ending):
-    """How a run ended. Everything but OK carries a cure."""
+    """How a run ended. Every status except OK includes a cure."""
 
     OK = 0, "done"
     DIVERGED = 1, "the state is no longer finite; shorten the step"
     STEP = (
         2,
-        "the step is too long for the squeeze stiffness of the film, which an explicit integrator "
-        "feels; shorten the step, or choose the integrator 'adaptive'",
+        "the step is too long for the squeeze stiffness of the film, which limits an explicit "
+        "integrator; shorten the step, or choose the integrator 'adaptive'",
     )
     THIN = (
         3,
@@ -20,7 +20,7 @@ class OrbitStatus(Ending):
     )
     OVERLOAD = (
         4,
-        "the load that rests on the journal is more than the film carries at its last "
+        "the steady load on the journal exceeds the capacity of the film at its last "
         "eccentricity; lower the load, raise speed, viscosity or length, or add a wall",
     )
     CONTACT = 5, "the journal touches its bearing; add a wall with a contact law, or lower the load"
@@ -32,11 +32,11 @@ class OrbitStatus(Ending):
     FILM = (
         7,
         "the direct solver of the film found no pressure where the journal went, as where it "
-        "touches a bump of the bore; check bore and grooves, or lower the load",
+        "touches a bump in the bore; check bore and grooves, or lower the load",
     )
-    STEPS = 8, "the adaptive integrator used up its steps; raise max_steps, or loosen the tolerance"
+    STEPS = 8, "the adaptive integrator reached max_steps; raise it, or loosen the tolerance"
     UNSETTLED = (
         9,
-        "where a step ends was not found, as where film and journal change too much in it; shorten "
+        "the end of a step was not found, as film and journal change too much in it; shorten "
         "the step, or refine the mesh",
     )

@@ -1,4 +1,4 @@
-"""Stages of one step: explicit integrators and RODAS, and the damping that bounds the explicit.
+"""Stages of one step: explicit integrators and RODAS, and the damping that limits explicit steps.
 
 Source: Hairer, Wanner (1996), Solving Ordinary Differential Equations II, section IV.10 (RODAS and
 its coefficients).
@@ -41,7 +41,7 @@ STAGES = 6
 
 
 class Tableau(NamedTuple):
-    """Coefficients of RODAS in the form that needs no products with the Jacobian."""
+    """Coefficients of RODAS in the form without products with the Jacobian."""
 
     a: NDArray[np.float64]
     c: NDArray[np.float64]
@@ -50,30 +50,30 @@ class Tableau(NamedTuple):
 
 
 class MarchWork(NamedTuple):
-    """Scratch of the march."""
+    """Scratch memory of the march."""
 
     y: NDArray[np.float64]  # (11, 4): state, point, eight stages, error
     rate: NDArray[np.float64]  # (6,): acceleration, load and its rates at the point
     first: NDArray[np.float64]  # (6,): the same at the start of the step
-    jacobian: NDArray[np.float64]  # (2, 4): of the acceleration
-    before: NDArray[np.float64]  # (7,): tau, state and acceleration where the last step began
-    cursor: NDArray[np.int64]  # (1,): place in the load history
-    held: NDArray[np.float64]  # (1,): speed at first touch
+    jacobian: NDArray[np.float64]  # derivatives of the acceleration
+    before: NDArray[np.float64]  # tau, state and acceleration at the start of the last step
+    cursor: NDArray[np.int64]  # index into the load history
+    held: NDArray[np.float64]  # speed at first contact
     clock: NDArray[np.float64]  # (4,)
     counts: NDArray[np.int64]  # (6,)
 
 
 TAU, STEP, ATTEMPT, JUMP = range(4)
-"""Places of the clock: instant, step planned, step tried, next jump of the load [rad]."""
+"""Indices of the clock: instant, step planned, step tried, next jump of the load [rad]."""
 
 CALL, SAMPLE, STEPS, REJECTED, CALLS, FAILED = range(6)
-"""Places of the counts: call within the step, next sample, steps taken and tried in vain,
-calls of the film, 1 where the last of them gave no pressure."""
+"""Indices of the counts: call within the step, next sample, steps taken, steps rejected,
+calls of the film, 1 if the last of them gave no pressure."""
 
 
 @kernel
 def copy_row(y: Any, source: int, target: int) -> None:
-    """Of four numbers."""
+    """Copy a row of four numbers."""
     for c in range(4):
         y[target, c] = y[source, c]
 
@@ -96,7 +96,7 @@ def spacing(work: MarchWork, c: int) -> float:
 
 @kernel
 def take_difference(work: MarchWork, c: int) -> None:
-    """One column of the Jacobian from the acceleration at the shifted point."""
+    """Fill one column of the Jacobian from the acceleration at the shifted point."""
     width = spacing(work, c)
     for r in range(2):
         work.jacobian[r, c] = (work.rate[r] - work.first[r]) / width
@@ -104,7 +104,7 @@ def take_difference(work: MarchWork, c: int) -> None:
 
 @kernel
 def rodas_point(work: MarchWork, stage: int, t: Tableau) -> None:
-    """Put the point where a stage of RODAS wants the acceleration."""
+    """Set the point of a RODAS stage."""
     copy_row(work.y, STATE, POINT)
     for j in range(stage):
         for c in range(4):
@@ -143,7 +143,7 @@ def rodas_solve(work: MarchWork, stage: int, h: float, t: Tableau) -> None:
 
 @kernel
 def rodas_error(work: MarchWork, tolerance: float) -> float:
-    """Error of the step over what is allowed: a share of the gap, and of gap and speed."""
+    """Error of the step over the tolerance: a share of the gap, and of gap and speed."""
     y = work.y
     x, z = y[POINT, 0], y[POINT, 1]
     e, x0, z0 = STAGE + 5, y[STATE, 0], y[STATE, 1]
@@ -156,7 +156,7 @@ def rodas_error(work: MarchWork, tolerance: float) -> float:
 
 @kernel
 def runge_kutta_point(work: MarchWork, stage: int, h: float) -> None:
-    """Put the point where a stage of the classical method wants the acceleration."""
+    """Set the point of a stage of the classical method."""
     copy_row(work.y, STATE, POINT)
     for c in range(4):
         work.y[POINT, c] += (h if stage == 3 else 0.5 * h) * work.y[STAGE + stage - 1, c]
@@ -164,7 +164,7 @@ def runge_kutta_point(work: MarchWork, stage: int, h: float) -> None:
 
 @kernel
 def keep_stage(work: MarchWork, stage: int) -> None:
-    """Rates at the point, of the classical method."""
+    """Save the rates at the point, for the classical method."""
     y = work.y
     y[STAGE + stage, 0], y[STAGE + stage, 1] = y[POINT, 2], y[POINT, 3]
     y[STAGE + stage, 2], y[STAGE + stage, 3] = work.rate[0], work.rate[1]
@@ -172,7 +172,7 @@ def keep_stage(work: MarchWork, stage: int) -> None:
 
 @kernel
 def explicit_finish(work: MarchWork, method: int, h: float) -> None:
-    """New state at the point."""
+    """Put the new state at the point."""
     y = work.y
     copy_row(y, STATE, POINT)
     if method == EULER:
@@ -188,7 +188,7 @@ def explicit_finish(work: MarchWork, method: int, h: float) -> None:
 
 @kernel
 def largest_damping(work: MarchWork) -> float:
-    """Largest eigenvalue (by size) of the damping matrix from the Jacobian."""
+    """Largest eigenvalue (by magnitude) of the damping matrix from the Jacobian."""
     jac = work.jacobian
     mean: float = 0.5 * (jac[0, 2] + jac[1, 3])
     det: float = jac[0, 2] * jac[1, 3] - jac[0, 3] * jac[1, 2]
@@ -198,7 +198,7 @@ def largest_damping(work: MarchWork) -> float:
 
 @kernel
 def first_stage(work: MarchWork, t: Tableau) -> None:
-    """Of RODAS, at the state."""
+    """First stage of RODAS, at the state."""
     copy_row(work.y, STATE, POINT)
     rodas_solve(work, 0, work.clock[ATTEMPT], t)
 
@@ -207,7 +207,7 @@ RODAS = Tableau(_A, _C, _INSTANT, _SLOPE)
 
 
 def new_work(state: tuple[float, float, float, float]) -> MarchWork:
-    """At a place and its rates."""
+    """Scratch memory for a march from a position and its rates."""
     work = MarchWork(
         y=np.zeros((11, 4)),
         rate=np.zeros(6),

@@ -1,4 +1,4 @@
-"""A journal bearing, from its scene to its recording."""
+"""Simulation of a journal bearing, from its scene to its recording."""
 
 import math
 from collections.abc import Callable
@@ -32,7 +32,7 @@ Float = NDArray[np.float64]
 Numerics = dict[str, float | int | str]
 
 _FEWEST_PER_TURN = 8
-"""Samples a revolution: three orders of the orbit below half the sample rate, and a margin."""
+"""Samples per revolution: three orders of the orbit below half the sample rate, and a margin."""
 
 _BYTES_PER_SAMPLE = 40 * 8  # states, forces, loads and two passes over the channels
 
@@ -47,23 +47,23 @@ _STATUS = {
     OrbitStatus.FILM: Status.NO_PRESSURE,
     OrbitStatus.STEPS: Status.TOO_MANY_STEPS,
 }
-"""How an orbit ended, in the words of a scene."""
+"""Status of a scene's run by the orbit's status."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JournalScale:
-    """The units in which the orbit is computed.
+    """Units of the orbit computation.
 
     Attributes
     ----------
     speed : float
-        Of the shaft [rad/s]; times are multiplied by it.
+        Shaft speed [rad/s]; multiplies times.
     clearance : float
-        Radial [m]; lengths are divided by it.
+        Radial clearance [m]; divides lengths.
     alpha : float
         ``eta R^3 L / (M C^3 omega)``: film force over the force below [-].
     force : float
-        ``M C omega^2`` [N]; loads are divided by it.
+        ``M C omega^2`` [N]; divides loads.
     pressure : float
         ``eta omega (R / C)^2`` [Pa].
     """
@@ -146,7 +146,7 @@ def film_geometry(scene: JournalScene) -> FilmGeometry:
 
 
 def journal_film(scene: JournalScene) -> OrbitFilm:
-    """Film of a scene, of the rung that it names.
+    """Film of a scene, by its rung.
 
     Examples
     --------
@@ -159,7 +159,7 @@ def journal_film(scene: JournalScene) -> OrbitFilm:
 
 
 def _mapped(geometry: FilmGeometry) -> OrbitFilm:
-    """Map of a plain bore: it has no clearance in it, so that all records of a set share one."""
+    """Map of a plain bore, independent of the clearance: all records of a set share it."""
     size = (geometry.length_to_diameter, geometry.n_theta, geometry.n_z, geometry.condition)
     return _plain_map(*size)
 
@@ -177,11 +177,11 @@ _FILMS: dict[str, Callable[[FilmGeometry], OrbitFilm]] = {
     "map": _mapped,
     "direct": solved_film,
 }
-"""Film of every rung of a scene. A new one is one row."""
+"""Film of every rung of a scene. A new rung is one row."""
 
 
 def journal_wall(scene: JournalScene) -> Wall | None:
-    """Contact of journal and shell in the orbit's units; None where a scene has none.
+    """Contact of journal and shell in the orbit's units; None if the scene has none.
 
     Examples
     --------
@@ -207,13 +207,13 @@ def journal_wall(scene: JournalScene) -> Wall | None:
 
 
 def journal_load(scene: JournalScene, lead: float = 0.0) -> Load:
-    """Everything that pushes on the journal but film and wall, in the orbit's units.
+    """All loads on the journal except film and wall, in the orbit's units.
 
     Parameters
     ----------
     scene : JournalScene
     lead : float
-        Time that the run begins before the first sample [s].
+        Time from the start of the run to the first sample [s].
 
     Returns
     -------
@@ -276,11 +276,11 @@ _HISTORIES: dict[str, Callable[[JournalLoad, float, float, _Vector], _History]] 
     "rectangular": _rectangular,
     "half-sine": _half_sine,
 }
-"""Course of a load. A new one is one row."""
+"""History of a load. A new one is one row."""
 
 
 def _orders(scene: JournalScene, scale: JournalScale, lead: float) -> list[tuple[float, ...]]:
-    """Forces that repeat with the shaft, as :func:`.orbit.load` takes them."""
+    """Forces periodic with the shaft, as arguments of :func:`.orbit.load`."""
     begin = scene.drive.start_angle - scale.speed * lead
     return [
         (
@@ -308,13 +308,13 @@ def _load_rows(scene: JournalScene) -> Float:
     try:
         rows = np.loadtxt(path, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:
-        fault = f"load.record.file = {record.file!r} is no CSV of numbers ({error}); mend it"
+        fault = f"load.record.file = {record.file!r} is no CSV of numbers ({error}); correct it"
         raise SceneError(scene.name, [fault]) from None
     sound = rows.shape[1] == 3 and len(rows) > 0 and bool(np.isfinite(rows).all())
     if not sound or not (np.diff(rows[:, 0]) >= 0).all():
         fault = (
             f"load.record.file = {record.file!r} must hold three columns, rising time [s] and two "
-            "forces [N], all finite; mend it"
+            "forces [N], all finite; correct it"
         )
         raise SceneError(scene.name, [fault])
     return np.asarray(rows)
@@ -324,12 +324,12 @@ def _load_rows(scene: JournalScene) -> Float:
 
 
 def check_journal(scene: Scene) -> None:
-    """Check what only the physics can tell: sampling, size, files.
+    """Check sampling, size and files, which need the physics.
 
     Raises
     ------
     SceneError
-        Every fault at once.
+        All faults together.
     """
     journal = cast(JournalScene, scene)
     faults = [*_sampling_faults(journal), *orbit_faults(journal)]
@@ -353,7 +353,7 @@ def _sampling_faults(scene: JournalScene) -> list[str]:
 
 
 class _Plan:
-    """Which samples are run through, and which are kept."""
+    """Samples of a run, and those that are kept."""
 
     def __init__(self, scene: JournalScene) -> None:
         rate = scene.sample_rate
@@ -365,12 +365,12 @@ class _Plan:
 
     @property
     def lead(self) -> float:
-        """How long before the first sample that is kept the run begins [s]."""
+        """Time from the start of the run to the first sample kept [s]."""
         return self.settling / self.scene.sample_rate
 
     @property
     def angle(self) -> Float:
-        """Of the shaft at the samples that are kept [rad]."""
+        """Shaft angle at the samples kept [rad]."""
         time = np.arange(self.n_samples) / self.scene.sample_rate
         turned = math.tau * self.scene.drive.speed * time
         return np.asarray(self.scene.drive.start_angle + turned)
@@ -409,14 +409,14 @@ def simulate_journal(scene: Scene, seed: int, truth: bool, raise_on_failure: boo
 def _run(scene: JournalScene, film: OrbitFilm, loads: Load, plan: "_Plan") -> OrbitRun:
     speed = math.tau * scene.drive.speed
     sample_step = speed / scene.sample_rate
-    told = scene.numerics.step
+    step = scene.numerics.step
     return run_orbit(
         film,
         loads,
         duration=sample_step * (plan.n_all - 1),
         start=(scene.start.x, scene.start.y),
         integrator=scene.numerics.integrator,
-        step=JOURNAL_STEP if told is None else speed * told,
+        step=JOURNAL_STEP if step is None else speed * step,
         sample_step=sample_step,
         tolerance=scene.numerics.tolerance,
         wall=journal_wall(scene),
@@ -426,10 +426,10 @@ def _run(scene: JournalScene, film: OrbitFilm, loads: Load, plan: "_Plan") -> Or
 def _measured(
     scene: JournalScene, position: Float, plan: _Plan, seed: int
 ) -> tuple[NDArray[np.float32], int]:
-    """Signal of every channel, and how many samples were clipped.
+    """Signal of every channel, and the number of clipped samples.
 
-    The orbit is sampled as it is: a jump of the load bends a displacement by the third power of
-    the frequency, so that nothing worth a filter lies above half the sample rate.
+    The orbit is sampled without a filter: a jump of the load affects a displacement by the third
+    power of the frequency, so that content above half the sample rate is negligible.
     """
     rng = np.random.default_rng(seed)
     rows, clipped = [], 0
@@ -464,7 +464,7 @@ def film_gap(scene: JournalScene, position: Float) -> Float:
     Returns
     -------
     numpy.ndarray [shape=(n,)]
-        Over the radial clearance; of a worn bore at the nodes of its mesh.
+        Over the radial clearance; for a worn bore, at the nodes of its mesh.
 
     Examples
     --------
@@ -483,9 +483,9 @@ def film_gap(scene: JournalScene, position: Float) -> Float:
 
 
 def _coarse(scene: JournalScene, position: Float) -> bool:
-    """Whether the thinnest film of an orbit spans too few nodes of its mesh to be right.
+    """Whether the thinnest film of an orbit spans too few nodes of its mesh to be accurate.
 
-    A wall takes over where the film ends.
+    With a wall this does not apply, as it takes over where the film ends.
     """
     if scene.film.rung == "short" or scene.bearing.wall is not None:
         return False
@@ -519,9 +519,9 @@ def _numerics(scene: JournalScene, scale: JournalScale, plan: _Plan, run: OrbitR
 
 
 def _guards(scene: JournalScene, film: OrbitFilm, run: OrbitRun) -> Numerics:
-    """What is left of the step's stability, and the error that the integrator expects."""
+    """Stability margin of the step, and the error expected by the integrator."""
     method = scene.numerics.integrator
-    if method == "adaptive":  # L-stable: no step is too long for a squeezed film
+    if method == "adaptive":  # L-stable: stable at any step
         return {"stability_margin": 1.0, "estimated_error": scene.numerics.tolerance}
     if not len(run.position):
         return {}
@@ -535,25 +535,25 @@ def _guards(scene: JournalScene, film: OrbitFilm, run: OrbitRun) -> Numerics:
 
 
 _STABLE = {"euler": 2.0, "rk4": 2.785}
-"""Step times damping at which a fixed-step integrator becomes unstable, on the real axis."""
+"""Stability limit of step times damping for a fixed-step integrator, on the real axis."""
 
-_NUDGE = 1e-4  # of the clearance per radian: the film is near to linear in so small a rate
+_NUDGE = 1e-4  # of the clearance per radian: the film is nearly linear in so small a rate
 
 
 def squeeze_rate(film: OrbitFilm, run: OrbitRun) -> float:
-    """Largest damping of the film at the outermost place of an orbit.
+    """Largest damping of the film at the outermost position of an orbit.
 
     Parameters
     ----------
     film : Film
     run : OrbitRun
-        Not empty.
+        Run with at least one sample.
 
     Returns
     -------
     float
         Largest eigenvalue of the symmetric part of ``-dF/dV``, over that of the unit of force;
-        times alpha it is the rate at which a squeeze dies down [1/rad].
+        times alpha it is the decay rate of a squeeze [1/rad].
 
     Examples
     --------
@@ -578,7 +578,7 @@ def squeeze_rate(film: OrbitFilm, run: OrbitRun) -> float:
 
 
 def _warnings(numerics: Numerics) -> tuple[str, ...]:
-    """What a user must know of a run that did not fail."""
+    """Warnings about a run that did not fail."""
     if int(numerics.get("clipped_samples", 0)) > 0:
         return (f"{numerics['clipped_samples']} samples clipped; widen the probe's range",)
     return ()

@@ -1,4 +1,4 @@
-"""What each machine registers, and what is asked of any: a recording, transfer functions.
+"""Physics of each machine, and the functions common to all: recording, transfer functions.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.pump``, ``sim.pump_lanes``, ``sim.journal``,
 ``sim.shaft_response``, ``sim.shaft``.

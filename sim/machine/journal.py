@@ -1,4 +1,4 @@
-"""The journal bearing: all that the program asks of it beside its scene."""
+"""The journal bearing's physics, as registered for the program."""
 
 from typing import cast
 

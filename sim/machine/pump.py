@@ -1,4 +1,4 @@
-"""The reciprocating pump: all that the program asks of it beside its scene."""
+"""The reciprocating pump's physics, as registered for the program."""
 
 import math
 from typing import cast
@@ -39,7 +39,7 @@ def _transfer(scene: Scene, frequency: Float) -> SceneTransfer:
 
 
 def _places(scene: PumpScene) -> tuple[str, ...]:
-    """Places of forces that the modes know, then those of exciters."""
+    """Places of forces in the modes, then those of exciters."""
     known = {key: None for mode in scene.casing.modes for key in mode.shape}
     forces = [key for key in known if key.startswith(FORCE_PLACES)]
     pushed = [part.place for part in scene.exciters if part.place in known]

@@ -1,4 +1,4 @@
-"""What a machine registers beside its scene, and where any other code asks for it."""
+"""Registration of each machine's physics, and its look-up by scene."""
 
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,35 +20,34 @@ Many = Callable[
 
 @dataclass(frozen=True, kw_only=True)
 class MachinePhysics:
-    """The physics of a machine: the value ``MACHINE`` of the module that its scene type names.
+    """Physics of a machine: the value ``MACHINE`` of the module named by its scene type.
 
     Attributes
     ----------
     scene : type
-        Of its scenes.
+        Type of its scenes.
     simulate : callable
-        Makes one recording: scene, seed, with its truth, error where it fails.
+        Makes one recording from scene, seed, with truth, raise on failure.
     check : callable
-        Raises SceneError for what only the physics can tell: rungs, step, sampling.
+        Raises SceneError for faults that need the physics: rungs, step, sampling.
     cost : callable
-        Scene -> time of a run by the tables, for ranking [s].
+        Scene -> time of a run by the tables [s], for ranking.
     recorder : callable, optional
-        Scene -> a `simulate` that has done what all starts of the scene share.
+        Scene -> a `simulate` that shares the work common to all starts of the scene.
     many : callable, optional
-        Sequence of (scene, seed), names of truth -> (number, recording with no truth but that, or
-        SceneError) of each, in any order: as `simulate` one by one, but faster. One that knows more
-        may say so.
+        Sequence of (scene, seed), names of truth -> (number, recording with at least that truth, or
+        SceneError) of each, in any order: the same as `simulate` one by one, but faster.
     alike : callable, optional
-        Scene -> what scenes have in common that `many` makes faster together than mixed; needed
-        beside `many`.
+        Scene -> key of scenes that `many` simulates faster together than mixed; needed with
+        `many`.
     transfer : callable, optional
-        Scene, frequency [Hz, shape=(n_lines,)] -> its transfer functions.
+        Scene, frequency [Hz, shape=(n_lines,)] -> transfer functions.
     ladders : mapping of str to tuple of Rung
         Effect -> its rungs, cheapest first.
     effects : callable
-        Scene -> its effects, each with its rungs; a machine with one model of everything has none.
+        Scene -> its effects, each with its rungs; none for a machine with a single model.
     step : callable, optional
-        Scene -> step that it runs with [s]; needed where ``numerics.step`` is an effect.
+        Scene -> step of its run [s]; needed if ``numerics.step`` is an effect.
     """
 
     scene: type[Scene]
@@ -65,7 +64,7 @@ class MachinePhysics:
 
 
 def machine_of(scene: Scene) -> MachinePhysics:
-    """The machine of a scene.
+    """Physics of a scene's machine.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The propulsion shaft: all that the program asks of it beside its scene."""
+"""The propulsion shaft's physics, as registered for the program."""
 
 from typing import cast
 
@@ -46,7 +46,7 @@ def _transfer(scene: Scene, frequency: Float) -> SceneTransfer:
 
 
 def _key(part: ShaftExciter) -> str:
-    """Name of a place that is pushed: ``forward_up``, ``forward_housing_side``."""
+    """Name of an exciter's place: ``forward_up``, ``forward_housing_side``."""
     at = part.place or f"{part.station:g} m"
     return f"{at}{'_housing' * (part.part == 'housing')}_{part.direction}"
 

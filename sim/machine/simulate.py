@@ -1,4 +1,4 @@
-"""From a scene to a recording: only the physics that the scene needs."""
+"""Simulation of any scene, importing only the physics that it needs."""
 
 from collections.abc import Collection, Hashable, Iterator, Sequence
 from dataclasses import replace
@@ -23,14 +23,14 @@ def simulate(
     truth : bool
         Also return forces and orbit at the sample instants.
     raise_on_failure : bool
-        False: a failed run comes back with its status and a signal of zeros.
+        False: a failed run is returned with its status and a signal of zeros.
 
     Returns
     -------
     Recording
-        Signal, channels, status, numerics, and truth where asked for; its warnings include what
-        of scene and signal is hardly meant, see :mod:`.scene.plausibility`. The ``estimated_error``
-        of its numerics is that of rungs and steps: it cannot tell whether the scene is a machine.
+        Signal, channels, status, numerics, and truth if requested; its warnings include implausible
+        values of scene and signal, see :mod:`.scene.plausibility`. The ``estimated_error``
+        of its numerics is that of rungs and steps: it does not cover how realistic the scene is.
 
     Raises
     ------
@@ -55,25 +55,25 @@ def simulate(
 def simulate_many(
     jobs: Sequence[tuple[Scene, int]], *, truth: Collection[str] = (), doubts: bool = True
 ) -> Iterator[tuple[int, Recording | SceneError]]:
-    """Simulate recordings of many scenes of one machine, side by side where it can.
+    """Simulate recordings of many scenes of one machine, in parallel where possible.
 
     Parameters
     ----------
     jobs : sequence of (Scene, int)
         Scene and seed of each, all of the same machine.
     truth : collection of str
-        Names of the truth that is needed. A recording has these at least; fewer may be had faster.
+        Names of the truth needed. A recording has at least these; fewer may be faster.
     doubts : bool
-        False: warnings are those of the run, without doubts about scene and signal, which cost a
-        spectrum of every channel.
+        False: only warnings of the run, without plausibility checks of scene and signal, which cost
+        a spectrum per channel.
 
     Yields
     ------
     number : int
-        Of the job. Every job comes once, in any order.
+        Number of the job. Every job is returned once, in any order.
     recording : Recording or SceneError
-        The bytes of :func:`simulate`, whatever is beside it; a failed run with its
-        status and a signal of zeros. Or the faults of a scene that is refused.
+        The same bytes as from :func:`simulate`, independent of the other jobs; a failed run with
+        its status and a signal of zeros. Or the faults of a scene that is refused.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def simulate_many(
 
 
 def simulates_together(scene: Scene) -> bool:
-    """Whether records of a scene's machine are faster side by side.
+    """Whether records of a scene's machine are faster in parallel.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def simulates_together(scene: Scene) -> bool:
 
 
 def alike(scene: Scene) -> Hashable:
-    """What scenes of a machine have in common that are best simulated together.
+    """Key of scenes of a machine that are best simulated together.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def _with_doubts(scene: Scene, solution: Recording) -> Recording:
 
 
 def recorder(scene: Scene) -> Recorder:
-    """What makes recordings of a scene from many starts, doing once what they share.
+    """Function that simulates a scene from many starts, sharing their common work.
 
     Parameters
     ----------
@@ -144,13 +144,13 @@ def recorder(scene: Scene) -> Recorder:
     Returns
     -------
     callable
-        Scene, seed, truth, raise_on_failure, as :func:`simulate`; the scene may differ from this
-        one in its start angle alone. Warnings are those of the run, without doubts about the scene.
+        Scene, seed, truth, raise_on_failure, as in :func:`simulate`; the scene may differ from this
+        one only in its start angle. Warnings are those of the run, without plausibility checks.
 
     Raises
     ------
     SceneError
-        As :func:`simulate`; of a machine whose starts share nothing, only when it is called.
+        As in :func:`simulate`; for a machine without shared work, raised only when called.
 
     Examples
     --------
@@ -166,12 +166,12 @@ def recorder(scene: Scene) -> Recorder:
 
 
 def check(scene: Scene) -> None:
-    """Check what only the physics can tell: rungs, step, sampling.
+    """Check rungs, step and sampling, which need the physics.
 
     Raises
     ------
     SceneError
-        Every fault at once.
+        All faults together.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def check(scene: Scene) -> None:
 
 
 def _refuse_unresolved(scene: Scene) -> None:
-    """Which rungs a scene needs is judged by features, which this floor does not know."""
+    """Refuse fidelity = 'auto': it is resolved by features, which this package does not use."""
     if scene.fidelity == "auto":
         fault = (
             "fidelity = 'auto' must be resolved before a run; set fidelity = 'given', or call "

@@ -1,4 +1,4 @@
-"""Transfer functions of a scene as the model has them: what a perfect test would measure."""
+"""Transfer functions of a scene's model, as a perfect test would measure them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,16 +9,16 @@ from .registry import machine_of
 
 
 def scene_transfer(scene: Scene, frequency: NDArray[np.float64]) -> SceneTransfer:
-    """Accelerance of a scene from every place of its forces, or of its exciters.
+    """Accelerance of a scene from the places of its forces or exciters.
 
     Parameters
     ----------
     scene : Scene
-        A pump: its casing, from the forces of the mechanism and from the places of its exciters. A
+        A pump: its casing, from the places of the mechanism's forces and of its exciters. A
         shaft line, running: from the places of its exciters, mounted or not; without any, from
-        every bearing's journal, up.
+        every bearing's journal, upwards.
     frequency : ndarray, shape (n_lines,)
-        [Hz]; of a measured casing the lines of its file between the first and the last of these.
+        Frequencies [Hz]; for a measured casing, the lines of its file within their range.
 
     Returns
     -------
@@ -27,10 +27,10 @@ def scene_transfer(scene: Scene, frequency: NDArray[np.float64]) -> SceneTransfe
     Raises
     ------
     SceneError
-        The machine has neither casing nor line; a file of the casing cannot be used; or a line of
-        a shaft was asked for at or below 0 Hz.
+        The machine has neither casing nor line; a file of the casing cannot be used; or a frequency
+        of a shaft line is at or below 0 Hz.
     ShaftFilmError
-        Beam and films find no balance.
+        Beam and films have no equilibrium.
 
     Examples
     --------
@@ -41,6 +41,6 @@ def scene_transfer(scene: Scene, frequency: NDArray[np.float64]) -> SceneTransfe
     """
     transfer = machine_of(scene).transfer
     if transfer is None:
-        fault = f"machine = '{scene.machine}' has no transfer function here; measure it"
+        fault = f"machine = '{scene.machine}' has no transfer function; measure it"
         raise SceneError(scene.name, [fault])
     return transfer(scene, np.asarray(frequency, dtype=np.float64))

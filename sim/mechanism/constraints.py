@@ -8,11 +8,11 @@ from .elastic_rod import (
     clear_spin,
     eye_acceleration,
     eye_turn,
+    from_bent_eye,
     inverse_inertia,
     is_elastic,
     lever_of,
     mode_accelerations,
-    of_bent_eye,
     push_modes,
 )
 from .layout import (
@@ -60,10 +60,10 @@ def _equations(
     sin_b: float,
     cos_b: float,
 ) -> int:
-    """Equations of one joint from number n on: what its constraint forces must accelerate.
+    """Add the equations of one joint from number n on: the accelerations its constraints cancel.
 
-    A link's force has friction across it, on one side of the eye in compression (`side` 1), on
-    the other in tension (-1). Returns the number of the next equation.
+    A link's force has friction across it, in compression on one side of the eye (`side` 1), in
+    tension on the other (-1). Returns the number of the next equation.
     """
     q, m, b, c = t.throws[k], t.machine, w.stage[row, k], t.contacts[k, joint]
     omega, b_rate = w.crank[row, SPEED], b.y[BETA_RATE]
@@ -84,7 +84,7 @@ def _equations(
         swung_x, swung_y = eye_acceleration(joint, k, w, row, t, sin_b, cos_b)
     apart_x -= b.rate[ROD_X_RATE] + swung_x
     apart_y -= b.rate[ROD_Y_RATE] + swung_y
-    d_x, d_y, v_x, v_y = of_bent_eye(offset, joint, b_rate, k, w, row, t, sin_b, cos_b)
+    d_x, d_y, v_x, v_y = from_bent_eye(offset, joint, b_rate, k, w, row, t, sin_b, cos_b)
     if rung == JOINT_IDEAL:
         for i in range(2):  # along x, then along y
             x, y = 1.0 - i, 1.0 * i
@@ -111,10 +111,10 @@ def _equations(
 
 
 class _Unit(NamedTuple):
-    """What a unit of one constraint force makes of its rod: accelerations [1/kg], [1/(kg m)]."""
+    """Accelerations of a rod per unit of one constraint force [1/kg], [1/(kg m)]."""
 
     swing: float
-    stretch: float  # of the modes; 0 of a rigid rod
+    stretch: float  # of the modes; 0 for a rigid rod
     bow: float
 
 
@@ -137,7 +137,7 @@ def _unit(j: int, k: int, w: Any, row: int, t: Any, sin_b: float, cos_b: float) 
 def _mobilities(
     n: int, k: int, w: Any, row: int, t: Any, sin_b: float, cos_b: float, inv_px: float
 ) -> None:
-    """What every unit constraint force does to every equation."""
+    """Fill in the effect of every unit constraint force on every equation."""
     q = t.throws[k]
     for j in range(n):
         u_x, u_y = w.place[j, ALONG_X], w.place[j, ALONG_Y]
@@ -159,7 +159,7 @@ def _mobilities(
 def _add_force(
     size: float, j: int, k: int, rate: Any, force: Any, w: Any, t: Any, unit: Any, inv_px: float
 ) -> Any:
-    """Add constraint force j to rates and forces of a throw; its friction's moment on the crank."""
+    """Add constraint force j to a throw's rates and forces; return its friction moment."""
     q = t.throws[k]
     f_x, f_y, rub = (
         size * w.place[j, ALONG_X],
@@ -193,14 +193,14 @@ def constrain(
     cos_b: float,
     inv_px: float,
 ) -> Any:
-    """Add the constraint forces of ideal joints and links; their friction's moment on the crank.
+    """Add constraint forces of ideal joints and links; return their friction moment on the crank.
 
-    Unknowns are forces along given directions at either end of the rod; the equations ask the
-    relative acceleration of pin and eye to be what keeps them together.
+    Unknowns are forces along given directions at either end of the rod; the equations require the
+    relative acceleration that keeps pin and eye together.
     """
     q, m, b = t.throws[k], t.machine, w.stage[row, k]
     least, at_pin, at_wrist, n = 1.0, 1.0, 1.0, 0
-    for _ in range(4):  # until every link has its friction on the side that its sign asks for
+    for _ in range(4):  # until the friction of every link is on the side that its sign requires
         n = 0
         if q.crankpin_rung < JOINT_COMPLIANT:
             n = _equations(CRANKPIN, n, at_pin, k, w, row, t, sin_a, cos_a, sin_b, cos_b)

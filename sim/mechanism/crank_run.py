@@ -1,4 +1,4 @@
-"""A run of the crank mechanism: from tables and start to states, forces and status."""
+"""Run of the crank mechanism: from tables and start to states, forces and status."""
 
 from dataclasses import dataclass
 
@@ -35,29 +35,29 @@ from .march import MarchRecord, Tally, integrate
 
 @dataclass(frozen=True, kw_only=True)
 class CrankTally:
-    """How a run of the mechanism went.
+    """Status and counts of a run of the mechanism.
 
     Attributes
     ----------
     steps : int
-        That were taken.
+        Number of steps taken.
     step : float
-        [s]
+        Integration step [s].
     status : Status
         How the run ended.
     peak_normal_force : float
-        Largest contact force met inside the steps [N].
+        Largest contact force within the steps [N].
     contact_changes, cuts_refused : int
-        Closings plus openings; steps with more than could be located.
+        Closings plus openings; steps with more changes than could be located.
     floored_closings : int
-        Contacts that closed more slowly than the speed floor of their law.
+        Contacts that closed more slowly than their law's speed floor.
     tension_steps : int
-        Steps at whose end a massless link was in tension: contact would be lost.
+        Steps that end with a massless link in tension, where contact would be lost.
     vapour_steps : int
-        Steps, summed over throws, at whose end a chamber held vapour.
+        Steps, summed over throws, that end with vapour in a chamber.
     parted_steps, unsettled_steps : tuple of int
-        Steps in which suction and discharge line held vapour; steps in which no pressure was found
-        at which they give what the pump draws, and the rest was booked.
+        Steps in which suction and discharge line held vapour; steps in which no line pressure
+        matched the flow that the pump draws, and the rest was booked as an error.
     """
 
     steps: int
@@ -83,26 +83,26 @@ class CrankRun(CrankTally):
         Crank angle [rad] and speed [rad/s] at the ends of the steps.
     forces : numpy.ndarray [shape=(n_steps, 1 + 10 n_throws)]
         Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step;
-        where main bearings have play two more, :data:`CRANK_FORCES`.
+        with play in the main bearings two more, :data:`CRANK_FORCES`.
     bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
-        Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
-        middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
+        Columns as :data:`BODY`, then their rates, at the ends of the steps; the mean of two rows is
+        the state in the middle of a step, where its forces apply. None if not kept.
     chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
-        Columns as ``CHAMBER_STATE``; None where nothing breathes.
+        Columns as ``CHAMBER_STATE``; None without chambers.
     gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
-        Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
+        Columns as :data:`GAPS`, at the starts of the steps' last stage; None without oiled pins.
     ends : numpy.ndarray [shape=(n_steps + 1, 2)] or None
-        Pressure [Pa] of suction and discharge line at the pump, means over the steps before; None
-        where no line is modelled.
+        Pressure [Pa] of suction and discharge line at the pump, means over the preceding steps;
+        None if no line is modelled.
     journal : numpy.ndarray [shape=(n_steps + 1, 4)] or None
-        Crank's journal from the centre of its bore (x, y) [m], and how fast [m/s], at the ends of
-        the steps; None where main bearings have no play or states are not kept.
+        Position of the crank's journal from the centre of its bore (x, y) [m], and velocity [m/s],
+        at the ends of the steps; None without play in the main bearings or if states are not kept.
     bore_gaps : numpy.ndarray [shape=(n_steps + 1, 2)] or None
-        Least gap of the film of the main bearings [m], and what its touching peaks carry [N], as
-        `gaps`; None where none is oiled.
+        Least gap of the film of the main bearings [m], and force of its asperities [N], like
+        `gaps`; None without oil.
     flex : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
         Stretch and bow of every rod [m], then their rates, as :data:`FLEX`, at the ends of the
-        steps; None where rods are rigid or states are not kept.
+        steps; None if rods are rigid or states are not kept.
     """
 
     turns: NDArray[np.float64]
@@ -116,7 +116,7 @@ class CrankRun(CrankTally):
     flex: NDArray[np.float64] | None = None
 
     def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
-        """One column of the forces, by its name in :data:`FORCES` or :data:`CRANK_FORCES` [N]."""
+        """One column of the forces by its name in :data:`FORCES` or :data:`CRANK_FORCES` [N]."""
         n_throws = (self.forces.shape[1] - 1) // len(FORCES)
         return self.forces[:, force_column(name, throw, n_throws)]
 
@@ -150,41 +150,40 @@ def run_mechanism(
     Parameters
     ----------
     t : Tables
-        Validated by the scene; a kernel trusts it.
+        Validated by the scene, not checked again.
     angle, speed : float
-        Of the crank at the start [rad], [rad/s].
+        Crank angle [rad] and speed [rad/s] at the start.
     bodies : numpy.ndarray [shape=(n_throws, 12)]
-        Columns as :data:`BODY`, then their rates. What ideal joints and links hold together must
-        be together.
+        Columns as :data:`BODY`, then their rates. Ideal joints and links must be closed.
     step : float
-        [s]
+        Integration step [s].
     n_steps : int
-        Steps to take.
+        Number of steps to take.
     chambers : numpy.ndarray [shape=(n_throws, 6)], optional
         State of the chambers at the start.
     films : numpy.ndarray [shape=(n_throws, 4)], optional
-        Columns as :data:`FILM`, at the start; inside the clearances.
+        Columns as :data:`FILM`, at the start; within the clearances.
     journal : numpy.ndarray [shape=(6,)], optional
-        Place of the crank's journal from the centre of its bore (x, y) [m], how fast [m/s], and
-        where its film lets it be [m], at the start, where main bearings have play.
+        Position of the crank's journal from the centre of its bore (x, y) [m], velocity [m/s], and
+        film position [m], at the start, if the main bearings have play.
     flex : numpy.ndarray [shape=(n_throws, 4)], optional
-        Stretch and bow of every elastic rod [m], then their rates, at the start; else 0.
+        Stretch and bow of every elastic rod [m], then their rates, at the start; default 0.
     lines : LinePair, optional
-        Shared by the chambers of all throws, each of which then breathes; replaced by their state
-        at the end.
+        Lines shared by the chambers of all throws, which all need a chamber; replaced by their
+        state at the end.
     casing : Yielding
-        On which the main bearing moves; bodies are seen from there.
+        Casing that carries the main bearing; bodies are described relative to the bearing.
     keep_states : bool
         Keep the bodies at the ends of all steps.
 
     Returns
     -------
     CrankRun
-        Cut off at the step in which it failed where the status is not OK.
+        Truncated at the step that failed if the status is not OK.
     """
     n = len(t.throws)
     rows = n_steps + 1 if keep_states else 1
-    breathing = bool(np.any(t.throws["pressure_rung"] == PRESSURE_CHAMBER))
+    chambered = bool(np.any(t.throws["pressure_rung"] == PRESSURE_CHAMBER))
     oiled = bool(
         np.any(t.throws["crankpin_rung"] == JOINT_OILED)
         or np.any(t.throws["wristpin_rung"] == JOINT_OILED)
@@ -212,7 +211,7 @@ def run_mechanism(
         turns=np.empty((n_steps + 1, 2)),
         forces=np.zeros((n_steps, 1 + n * len(FORCES) + 2 * len(t.bearing))),
         states=np.empty((rows, n, PER_THROW)),
-        chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
+        chambers=np.empty((n_steps + 1 if chambered else 1, n, 8)),
         gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
         ends=np.zeros((n_steps + 1 if lines else 1, 2)),
         journal=np.empty((rows if len(t.bearing) else 1, 4)),
@@ -227,7 +226,7 @@ def run_mechanism(
         turns=r.turns[: done + 1],
         forces=r.forces[:done],
         bodies=r.states[: done + 1] if keep_states else None,
-        chambers=r.chambers[: done + 1, :, :6] if breathing else None,
+        chambers=r.chambers[: done + 1, :, :6] if chambered else None,
         gaps=r.gaps[: done + 1] if oiled else None,
         ends=r.ends[: done + 1] if lines else None,
         journal=r.journal[: done + 1] if keep_states and len(t.bearing) else None,

@@ -1,10 +1,10 @@
-"""One Runge-Kutta step of a throw, cut where a contact closes or opens."""
+"""One Runge-Kutta step of a throw, cut at each closing or opening of a contact."""
 
 from typing import Any
 
 from ..contact.law import LAW_CONSTANT_LOSS
 from ..jit import kernel, sine_cosine
-from .elastic_rod import of_bent_eye
+from .elastic_rod import from_bent_eye
 from .equations import derivative_of_record
 from .layout import (
     ANGLE,
@@ -27,12 +27,12 @@ from .layout import (
 from .main_bearing import is_journal, journal_margin, with_play
 from .throw_motion import corner_margin, crank_offset, pin_touch, worn_eye, wrist_offset
 
-_MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
+_MOST_CUTS = 8  # contact changes located within one step and throw
 
 
 @kernel
 def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
-    """Margin of one contact alone, for the search of its change; after all throws the journal's."""
+    """Margin of one contact, for locating its change; the index after the throws: the journal."""
     if is_journal(k, t):
         return journal_margin(w, row, t)
     q, p, omega = t.throws[k], pose_of(w.stage[row, k]), w.crank[row, SPEED]
@@ -46,7 +46,7 @@ def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
         offset = with_play(crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b), w, row, t)
     else:
         offset = wrist_offset(p, q, sin_b, cos_b)
-    offset = of_bent_eye(offset, j, p.beta_rate, k, w, row, t, sin_b, cos_b)
+    offset = from_bent_eye(offset, j, p.beta_rate, k, w, row, t, sin_b, cos_b)
     (d_x, d_y, v_x, v_y), _ = worn_eye(offset, p.beta_rate, sin_b, cos_b, t.contacts[k, j])
     touch, _, _ = pin_touch(d_x, d_y, v_x, v_y, touching, impact, t.contacts[k, j])
     return touch.margin
@@ -54,7 +54,7 @@ def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
 
 @kernel
 def _corner_place(number: int) -> Any:
-    """Along and across of a corner of the piston: rear and front, upper then lower."""
+    """Coordinates along and across of a corner of the piston: rear and front, upper then lower."""
     return (1.0 if number & 1 else -1.0), (1.0 if number < 2 else -1.0)
 
 
@@ -71,7 +71,7 @@ def _hermite(
 
 @kernel
 def _interpolate(k: int, w: Any, i: int, h: float, s: float, t: Any) -> None:
-    """State of crank and one throw a fraction s into the step from row i, into row 2."""
+    """Interpolate crank and one throw, a fraction s into the step from row i, into row 2."""
     y, z = w.crank, 1 - i
     for c in range(2):
         y[2, c] = _hermite(y[i, c], y[i, 2 + c], y[z, c], y[z, 2 + c], h, s)
@@ -92,20 +92,20 @@ def _interpolate(k: int, w: Any, i: int, h: float, s: float, t: Any) -> None:
 
 @kernel
 def _margin_of(k: int, j: int, w: Any, row: int, t: Any) -> float:
-    """Margin of a contact as the derivative of a row has left it [N]."""
+    """Margin of a contact from the last derivative of a row [N]."""
     margin: float = w.journal[row, 0].margin if is_journal(k, t) else w.stage[row, k].margin[j]
     return margin
 
 
 @kernel
 def _locate_change(k: int, j: int, w: Any, i: int, h: float, t: Any) -> Any:
-    """Fraction of the step at which one contact changes: Illinois on the dense output."""
+    """Fraction of the step at which a contact changes: Illinois method on the dense output."""
     low, high = 0.0, 1.0
     f_low, f_high = _margin_of(k, j, w, i, t), _margin_of(k, j, w, 1 - i, t)
     share = 0.5
     while f_low <= 0.0:  # changed just now, at rounding: it must hold before it changes again
         if share < 1e-4:
-            return 0.0  # it never holds: it asks for the change at once
+            return 0.0  # it never holds: change it at once
         _interpolate(k, w, i, h, share, t)
         low, f_low = share, contact_margin(k, j, w, 2, t)
         share *= 0.5
@@ -128,7 +128,7 @@ def _locate_change(k: int, j: int, w: Any, i: int, h: float, t: Any) -> Any:
 
 @kernel
 def _first_change(w: Any, i: int, h: float, locate: bool, t: Any) -> Any:
-    """Earliest contact that asks for a change within the step: when, throw (-1: none), contact."""
+    """Earliest contact change within the step: time, throw (-1: none), contact."""
     first, throw, contact = 1.0, -1, 0
     for k in range(t.throws.shape[0]):
         after = w.stage[1 - i, k]
@@ -148,7 +148,7 @@ def _first_change(w: Any, i: int, h: float, locate: bool, t: Any) -> Any:
 
 @kernel
 def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
-    """State of a row: that of row i moved along the rates of row `slope` over `share` [s]."""
+    """Set a row's state: that of row i moved along the rates of row `slope` over `share` [s]."""
     for c in range(2):
         w.crank[row, c] = w.crank[i, c] + share * w.crank[slope, 2 + c]
     for k in range(w.stage.shape[1]):
@@ -171,7 +171,7 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
 
 @kernel
 def mean_of_stages(first: float, middle: float, last: float) -> float:
-    """Six times the weighted mean of the four stages of a step, `middle` the sum of two."""
+    """Six times the weighted mean of a step's four stages, `middle` being the sum of two."""
     return first + 2.0 * middle + last
 
 
@@ -212,9 +212,9 @@ def _finish(w: Any, i: int, h: float) -> None:
 
 @kernel
 def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, t: Any) -> None:
-    """Runge-Kutta from row i to the other over `h`, with the contacts held as they are.
+    """Take a Runge-Kutta step from row i to the other over `h`, without contact changes.
 
-    `passed` of the `whole` step lie behind. The derivative at the start is made anew unless it is
+    `passed` of the `whole` step have passed. The derivative at the start is recomputed unless
     `fresh`; that at the end is left for the next step.
     """
     for stage in range(1 if fresh else 0, 5):
@@ -231,7 +231,7 @@ def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, 
 
 @kernel
 def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
-    """Open or close one contact; 1 where it closed more slowly than its law's floor."""
+    """Open or close one contact; return 1 if it closed more slowly than its law's floor."""
     if is_journal(k, t):
         return _flip_journal(w, i, t)
     held = w.held[k]
@@ -255,10 +255,10 @@ def _flip_journal(w: Any, i: int, t: Any) -> int:
 
 @kernel
 def _change(throw: int, contact: int, w: Any, i: int, t: Any, tally: Any) -> None:
-    """Change a contact, and all that ask for it at the same instant.
+    """Change a contact, and all others due at the same instant.
 
-    Both corners of a piston that stands straight do: one of them left for later would be late by
-    what is left of the step.
+    Both corners of an untilted piston change together: one of them left for later would be late by
+    the rest of the step.
     """
     for k in range(t.throws.shape[0]):
         for j in range(CONTACTS):
@@ -302,10 +302,10 @@ def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally:
 def step_of_record(
     w: Any, i: int, h: float, fresh: bool, tried: bool, t: Any, forces: Any, step: int, tally: Any
 ) -> Any:
-    """One whole step, cut wherever a contact closes or opens.
+    """Take one whole step, cut wherever a contact closes or opens.
 
-    A step that was `tried` without a cut stands in the other row, and a contact asks for one.
-    Returns the row it ended in, and whether that row's derivative is fresh.
+    The result of a step that was `tried` without a cut is in the other row, with a contact change
+    due. Returns the row of the end, and whether that row's derivative is up to date.
     """
     left, taken, cuts, k, j = h, h, 0, -1, 0
     while left > 0.0:

@@ -1,20 +1,20 @@
-"""Rods that stretch and bend: the first axial and the first bending mode of each.
+"""Rods elastic in tension and bending: the first axial and the first bending mode of each.
 
 A point of the rod at s from its centre of mass, towards the crank pin, lies at
 
     r + (1 + u / L) s e + v w(s) g
 
-with the stretch u between the eyes, the bow v in its middle against the line of its eyes, and the
-shape w, the half sine of a beam between two pins less what of it is a motion of the whole rod. Both
-shapes leave the centre of mass and the angle of the rod's axes alone, and each other, so that
-Newton's equation of the rod stays as it is, Euler's has an inertia that changes, and
+with the stretch u between the eyes, the bow v in the middle relative to the line of the eyes, and
+the shape w, the half sine of a pinned beam less its rigid-body part. Both shapes are independent of
+the centre of mass, of the angle of the rod's axes and of each other, so that
+Newton's equation of the rod is unchanged, Euler's has a variable inertia, and
 
     m_u (u'' - (L + u) b'^2) = -k_u u - c_u u' + sum F . e s / L,            m_u = J / L^2
     m_v (v'' - v b'^2) = -k_v v - c_v v' + sum (F . g w - M w'),
     ((J (1 + u / L)^2 + m_v v^2) b')' = sum (F . ((1 + u / L) s g - v w e) - M)
 
-for forces F of the pins at both eyes and the moments M against their turning. The axial force does
-not soften the bending: it stays below a tenth of Euler's load.
+for forces F of the pins at both eyes and moments M against their turning. The axial force does
+not reduce the bending stiffness: it stays below a tenth of Euler's load.
 
 Source: Shabana (2020), Dynamics of Multibody Systems, floating frame of reference with mean axes.
 """
@@ -27,7 +27,7 @@ from .throw_motion import Rates
 
 
 class Lever(NamedTuple):
-    """An eye from its rod's centre of mass, in the rod's axes, and how the modes move it."""
+    """Position of an eye from its rod's centre of mass, in the rod's axes, and mode shapes."""
 
     along: float  # [m]
     across: float  # [m]
@@ -38,14 +38,14 @@ class Lever(NamedTuple):
 
 @kernel
 def is_elastic(t: Any) -> bool:
-    """Whether the rods stretch and bend."""
+    """Whether the rods are elastic."""
     found: bool = t.flex.shape[0] > 0
     return found
 
 
 @kernel
 def lever_of(joint: int, k: int, w: Any, row: int, t: Any) -> Any:
-    """Lever of the eye at one end of a rod, see :class:`Lever`; without modes of a rigid one."""
+    """Lever of the eye at one end of a rod, see :class:`Lever`; for a rigid rod, without modes."""
     q = t.throws[k]
     arm = q.rod_arm if joint == CRANKPIN else -q.rod_centre
     if not is_elastic(t):
@@ -58,7 +58,7 @@ def lever_of(joint: int, k: int, w: Any, row: int, t: Any) -> Any:
 
 
 @kernel
-def of_bent_eye(
+def from_bent_eye(
     offset: Any,
     joint: int,
     beta_rate: float,
@@ -87,7 +87,7 @@ def of_bent_eye(
 
 @kernel
 def eye_turn(joint: int, beta_rate: float, k: int, w: Any, row: int, t: Any) -> float:
-    """Rate at which the eye of a joint turns, in the sense of the rod's angle [rad/s]."""
+    """Angular velocity of a joint's eye, in the sense of the rod's angle [rad/s]."""
     if not is_elastic(t):
         return beta_rate
     turn: float = beta_rate + lever_of(joint, k, w, row, t).slope * w.flex[row, k].y[BOW_RATE]
@@ -96,7 +96,7 @@ def eye_turn(joint: int, beta_rate: float, k: int, w: Any, row: int, t: Any) -> 
 
 @kernel
 def inverse_inertia(k: int, w: Any, row: int, t: Any) -> float:
-    """Of a rod about its centre of mass, as it is stretched and bent [1/(kg m^2)]."""
+    """Inverse inertia of a deformed rod about its centre of mass [1/(kg m^2)]."""
     rigid: float = t.throws[k].inverse_rod_inertia
     if not is_elastic(t):
         return rigid
@@ -110,10 +110,10 @@ def inverse_inertia(k: int, w: Any, row: int, t: Any) -> float:
 def flexed(
     k: int, w: Any, row: int, t: Any, rates: Any, pin: Any, wrist: Any, sin_b: float, cos_b: float
 ) -> Any:
-    """Accelerations of a throw, its rod elastic; those of the modes go into their row.
+    """Accelerations of a throw with elastic rod; those of the modes are stored in their row.
 
     `pin` and `wrist` are the loads on both eyes about their centres, and `rates` those of a rigid
-    rod under them.
+    rod under these loads.
     """
     q, f, b = t.throws[k], t.flex[k], w.flex[row, k]
     y, turn = b.y, w.stage[row, k].y[BETA_RATE]
@@ -167,7 +167,7 @@ def mode_accelerations(
     sin_b: float,
     cos_b: float,
 ) -> Any:
-    """What a force on an eye, and a couple against its turning, make of stretch and bow."""
+    """Accelerations of stretch and bow from a force on an eye and a couple against its turning."""
     f, at = t.flex[k], lever_of(joint, k, w, row, t)
     stretch = at.reach * (u_y * sin_b - u_x * cos_b) * f.inverse_stretch_mass
     bow = (at.shape * (u_x * sin_b + u_y * cos_b) - at.slope * couple) * f.inverse_bow_mass
@@ -176,7 +176,7 @@ def mode_accelerations(
 
 @kernel
 def clear_spin(k: int, w: Any, row: int) -> None:
-    """Begin the sum of what a rod's modes do per crank acceleration; none of a rigid rod."""
+    """Reset the modes' rates per crank acceleration; nothing for a rigid rod."""
     if w.flex.shape[1] > 0:
         b = w.flex[row, k]
         b.rate_per_turn[STRETCH] = b.rate_per_turn[BOW] = 0.0
@@ -186,7 +186,7 @@ def clear_spin(k: int, w: Any, row: int) -> None:
 def push_modes(
     size: float, per_turn: float, stretch: float, bow: float, k: int, w: Any, row: int
 ) -> None:
-    """Add a constraint force, and its share per crank acceleration, to the modes of its rod."""
+    """Add a constraint force, and its part per crank acceleration, to the modes of its rod."""
     b = w.flex[row, k]
     b.rate[STRETCH_RATE] += size * stretch
     b.rate[BOW_RATE] += size * bow
@@ -196,7 +196,7 @@ def push_modes(
 
 @kernel
 def spun_up_rods(turning: float, w: Any, row: int, t: Any) -> None:
-    """Rates of all modes, from those at constant crank speed and the crank's acceleration."""
+    """Add the effect of the crank's acceleration to the rates of all modes."""
     for k in range(t.flex.shape[0]):
         b = w.flex[row, k]
         for c in range(len(FLEX)):

@@ -7,7 +7,7 @@ from ..hydraulics.parameters import PRESSURE_CHAMBER
 from ..hydraulics.piston_pressure import line_pressure
 from ..jit import kernel, sine_cosine
 from .constraints import constrain
-from .elastic_rod import eye_turn, flexed, is_elastic, of_bent_eye, spun_up_rods
+from .elastic_rod import eye_turn, flexed, from_bent_eye, is_elastic, spun_up_rods
 from .layout import (
     ANGLE,
     ANGLE_RATE,
@@ -70,7 +70,7 @@ def _oiled(
     held: Any,
     t: Any,
 ) -> Any:
-    """Load of a pin on the rod through oil, and the size of its force."""
+    """Load of an oiled pin on the rod, and the magnitude of its force."""
     n = 2 * joint
     f_x, f_y, on_pin, on_eye, rate_x, rate_y, gap, peaks = oiled_joint(
         b.film[n],
@@ -104,10 +104,10 @@ def _pin_load(
     held: Any,
     t: Any,
 ) -> Any:
-    """Load of a pin on the rod by any rung that is a force, what presses, and the overlap.
+    """Load of a pin on the rod for rungs with a force, the normal force, and the overlap.
 
-    `eye` is the rate at which its eye turns, in the sense of the rod's angle [rad/s]. A link's load
-    is its viscous part; the pin of an ideal joint has none.
+    `eye` is the angular velocity of its eye, in the sense of the rod's angle [rad/s]. A link's load
+    is its viscous part; an ideal joint has none.
     """
     if rung == JOINT_IDEAL:
         return PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
@@ -128,7 +128,7 @@ def _pin_load(
 
 @kernel
 def _guide(p: Any, q: Any, b: Any, held: Any, c: Any) -> Any:
-    """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
+    """Force of a guide with clearance on the piston (x, y, moment), peak normal force, overlap."""
     f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
     sin_t, cos_t = sine_cosine(p.tilt)
     for end in range(2):
@@ -155,7 +155,7 @@ def _guide(p: Any, q: Any, b: Any, held: Any, c: Any) -> Any:
 
 @kernel
 def _pressure(k: int, w: Any, row: int, share: float, t: Any) -> Any:
-    """Pressure on the piston, and the mass of the liquid that moves with it."""
+    """Pressure on the piston, and the mass of the liquid that moves with the piston."""
     q, held = t.throws[k], w.held[k]
     if q.pressure_rung == PRESSURE_CHAMBER:
         before, after = held.pressure[0], held.pressure[1]
@@ -174,7 +174,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     pressure, added = _pressure(k, w, row, share, t)
     on_face, inv_px = -q.piston_area * pressure, 1.0 / (q.piston_mass + added)
     centred = with_play(crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b), w, row, t)
-    centred = of_bent_eye(centred, CRANKPIN, p.beta_rate, k, w, row, t, sin_b, cos_b)
+    centred = from_bent_eye(centred, CRANKPIN, p.beta_rate, k, w, row, t, sin_b, cos_b)
     at_crank, along = worn_eye(centred, p.beta_rate, sin_b, cos_b, t.contacts[k, CRANKPIN])
     eye = eye_turn(CRANKPIN, p.beta_rate, k, w, row, t)
     at_eye, peak, overlap = _pin_load(
@@ -185,7 +185,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
     if q.wristpin_rung != JOINT_IDEAL:
         at_wrist = wrist_offset(p, q, sin_b, cos_b)
-        at_wrist = of_bent_eye(at_wrist, WRISTPIN, p.beta_rate, k, w, row, t, sin_b, cos_b)
+        at_wrist = from_bent_eye(at_wrist, WRISTPIN, p.beta_rate, k, w, row, t, sin_b, cos_b)
         eye = eye_turn(WRISTPIN, p.beta_rate, k, w, row, t)
         wrist, normal, overlap = _pin_load(
             WRISTPIN, q.wristpin_rung, q.wristpin_radius, at_wrist, p.tilt_rate, eye, k, b, held, t
@@ -221,7 +221,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     pin_x, pin_y = b.force[PIN_FORCE], b.force[PIN_FORCE + 1]
     w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
     b.force[FACE_FORCE], b.force[SEAL_FORCE] = on_face - added * b.rate[PISTON_X_RATE], seal
-    if q.guide_rung != JOINT_COMPLIANT:  # what holds the piston up
+    if q.guide_rung != JOINT_COMPLIANT:  # support of the piston by an ideal guide
         guide_y = b.force[WRIST_FORCE + 1] + m.gravity_y * q.piston_mass
     b.force[GUIDE_FORCE], b.force[GUIDE_FORCE + 1] = guide_x, guide_y
     if q.crankpin_rung < JOINT_COMPLIANT and m.inverse_inertia > 0.0:
@@ -232,7 +232,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
 
 @kernel
 def derivative_of_record(w: Any, row: int, share: float, t: Any) -> None:
-    """Rates, forces and margins at the state of a row; `share` of the step has passed."""
+    """Rates, forces and margins for the state of a row, `share` of the step having passed."""
     m = t.machine
     w.moment[0] = w.moment[1] = 0.0
     for k in range(t.throws.shape[0]):

@@ -1,4 +1,4 @@
-"""Tables, states and scratch of the crank mechanism: what the kernels are told and remember."""
+"""Tables, states and scratch memory of the crank mechanism's kernels."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from ..jit import kernel
 from .throw_motion import Pose
 
 JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT, JOINT_OILED = 0, 1, 2, 3
-"""From `JOINT_COMPLIANT` on a joint is a force that follows from the motion."""
+"""Joint models from `JOINT_COMPLIANT` on are forces that follow from the motion."""
 
 THROW = np.dtype(
     [
@@ -24,9 +24,9 @@ THROW = np.dtype(
         ("inverse_piston_across", "f8"),  # 0 in an ideal guide [1/kg]
         ("inverse_piston_tilt", "f8"),  # about the wrist pin; 0 in an ideal guide [1/(kg m^2)]
         ("piston_area", "f8"),
-        ("seal_friction", "f8"),  # by the seal's tension [N]
-        ("seal_friction_area", "f8"),  # more of it per pressure [N/Pa]
-        ("seal_friction_speed", "f8"),  # that regularises its sign [m/s]
+        ("seal_friction", "f8"),  # from the seal's tension [N]
+        ("seal_friction_area", "f8"),  # additional, per pressure [N/Pa]
+        ("seal_friction_speed", "f8"),  # regularises its sign [m/s]
         ("crankpin_rung", "i8"),
         ("wristpin_rung", "i8"),
         ("guide_rung", "i8"),
@@ -44,7 +44,7 @@ CRANKPIN, WRISTPIN, GUIDE = 0, 1, 2
 """Columns of the contact table, one row per throw."""
 
 CONTACTS = 6
-"""Places of contact per throw: crank pin, wrist pin, and the guide's corners, rear and front,
+"""Contacts per throw: crank pin, wrist pin, and the guide's corners, rear and front,
 upper then lower."""
 
 
@@ -56,7 +56,7 @@ MAIN_BEARING = np.dtype(
         ("rung", "i8"),  # JOINT_COMPLIANT or JOINT_OILED
     ]
 )
-"""Main bearings with play, seen as one; a crank without play has none."""
+"""Main bearings with play, lumped into one; a crank without play has none."""
 
 
 ROD_MODES = np.dtype(
@@ -77,23 +77,23 @@ ROD_MODES = np.dtype(
 """Modes of an elastic rod, see :mod:`.elastic_rod`; rigid rods have none."""
 
 FLEX = ("stretch", "bow")
-"""Coordinates of an elastic rod: between its eyes, in its middle [m]; the state holds these, then
-their rates."""
+"""Coordinates of an elastic rod: stretch between its eyes, bow in the middle [m]; the state holds
+these, then their rates."""
 
 STRETCH, BOW, STRETCH_RATE, BOW_RATE = range(2 * len(FLEX))
 """Columns of an elastic rod's state."""
 
 
 class Machine(NamedTuple):
-    """What the throws share, in SI."""
+    """Quantities shared by the throws, in SI."""
 
     gravity_x: float
     gravity_y: float
-    inverse_inertia: float  # of everything that turns; 0 is constant speed
+    inverse_inertia: float  # of everything that turns; 0: constant speed
     static_moment: float  # unbalance of the crank along the first throw [kg m]
     drive_moment: float  # constant part [N m]
     synchronous_speed: float  # of the motor, at the crank [rad/s]
-    breakdown_moment: float  # largest moment of the motor [N m]; 0 is none
+    breakdown_moment: float  # largest moment of the motor [N m]; 0: none
     breakdown_slip: float
     baumgarte: float  # decay rate of constraint drift [1/s]
 
@@ -124,14 +124,14 @@ FORCES = (
 """Mean forces of a throw over a step [N]: crank pin on rod, wrist pin on rod, guide on piston
 (friction along x, push along y), liquid on piston, seal on piston, each valve on the casing along
 the stroke.
-Before them stands the drive moment [N m]."""
+The drive moment [N m] comes before them."""
 
 CRANK_FORCES = ("main_x", "main_y")
-"""Mean force over a step of a journal with play on its main bearing [N], after all throws'."""
+"""Mean force over a step of a journal with play on its main bearing [N], after the throws'."""
 
 
 def force_column(name: str, throw: int, n_throws: int) -> int:
-    """Column of a force of a throw, counted from 0, or of the crank among those of a run."""
+    """Index of a force of a throw, counted from 0, or of the crank, among a run's columns."""
     if name in CRANK_FORCES:
         return 1 + len(FORCES) * n_throws + CRANK_FORCES.index(name)
     return 1 + len(FORCES) * throw + FORCES.index(name)
@@ -147,18 +147,18 @@ PIN_FORCE, WRIST_FORCE, GUIDE_FORCE, FACE_FORCE, SEAL_FORCE, VALVE_FORCES = (
 )  # first columns of FORCES
 
 FILM = ("crankpin_x", "crankpin_y", "wristpin_x", "wristpin_y")
-"""Where the films of a throw let its pins be, from the centres of their eyes [m]."""
+"""Film positions of a throw's pins, from the centres of their eyes [m]."""
 
 GAPS = ("crankpin_gap", "wristpin_gap", "crankpin_peaks", "wristpin_peaks")
-"""Least gap of each film [m], and what its touching peaks carry [N]; a joint without oil has 0."""
+"""Least gap of each film [m], and force of its asperities [N]; 0 for a joint without oil."""
 
-OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
+OVERLAP_LIMIT = 0.1  # of the pin radius: limit of small-penetration contact laws
 
 NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
 
 
 class Tables(NamedTuple):
-    """Everything that the kernel is told."""
+    """All inputs of the kernel."""
 
     throws: NDArray[Any]  # (n_throws,) of THROW
     contacts: NDArray[Any]  # (n_throws, 3) of CONTACT
@@ -173,15 +173,15 @@ class Tables(NamedTuple):
 
 
 class Yielding(NamedTuple):
-    """A casing whose modes carry the main bearing along; without any mode it is at rest."""
+    """A casing whose modes carry the main bearing; without modes it is at rest."""
 
     push: NDArray[np.float64]  # (n_modes, n_throws, len(PUSHES)): modal force per force
-    react: NDArray[np.float64]  # (n_modes, 3): mean acceleration over a step, per force in it and
-    reach: NDArray[np.float64]  # (n_modes, 3): place after it, per place and speed before it
+    react: NDArray[np.float64]  # mean acceleration over a step, per force and
+    reach: NDArray[np.float64]  # displacement after it, per displacement and speed before it
     give: NDArray[np.float64]  # (n_modes, 2): shape at the bearing, along and across [kg^-0.5]
-    held: NDArray[np.float64]  # (n_modes, 2): pushes back by what it carries [kg^0.5]
+    held: NDArray[np.float64]  # modal reaction of the carried masses [kg^0.5]
     journal: NDArray[np.float64]  # (n_modes, 2): modal force per force of CRANK_FORCES
-    blend: NDArray[np.float64]  # (2, 2): what that makes of its acceleration, see `settled`
+    blend: NDArray[np.float64]  # feedback of the acceleration, see `settled`
 
 
 PUSHES = tuple(
@@ -197,7 +197,7 @@ PUSHES = tuple(
         "discharge_valve",
     )
 )
-"""Columns of FORCES that push on the casing, in the order in which they are added up."""
+"""Columns of FORCES that act on the casing, in the order of summation."""
 
 AT_REST = Yielding(
     push=np.zeros((0, 1, len(PUSHES))),
@@ -208,7 +208,7 @@ AT_REST = Yielding(
     journal=np.zeros((0, 2)),
     blend=np.zeros((2, 2)),
 )
-"""A bearing that does not move."""
+"""Casing at rest."""
 
 STAGE = np.dtype(
     [
@@ -219,7 +219,7 @@ STAGE = np.dtype(
         ("approach", "f8", CONTACTS),
         ("normal", "f8"),  # largest normal force
         ("overlap", "f8"),  # largest overlap over the pin radius
-        ("link", "f8"),  # least force in a link: negative is tension
+        ("link", "f8"),  # least force in a link; negative: tension
         ("rate_per_turn", "f8", PER_THROW),  # per crank acceleration
         ("force_per_turn", "f8", len(FORCES)),
         ("film", "f8", len(FILM)),
@@ -238,26 +238,26 @@ HELD = np.dtype(
         ("squeeze", "f8", (2, 2)),  # last velocity of each film, where the next search begins
     ]
 )
-"""What one throw remembers from step to step."""
+"""State of one throw that is carried from step to step."""
 
 JOURNAL = np.dtype(
     [
-        ("y", "f8", 4),  # journal from the centre of its bore (x, y) [m], and how fast [m/s]
+        ("y", "f8", 4),  # journal from the centre of its bore (x, y) [m], and velocity [m/s]
         ("rate", "f8", 4),
         ("force", "f8", 2),  # on the bearing (x, y) [N]
         ("margin", "f8"),
         ("approach", "f8"),
         ("normal", "f8"),
         ("overlap", "f8"),  # over the journal's radius
-        ("film", "f8", 2),  # where the film lets the journal be [m]
+        ("film", "f8", 2),  # film position of the journal [m]
         ("film_rate", "f8", 2),
-        ("gaps", "f8", 2),  # least gap of the film [m], and what touching peaks carry [N]
+        ("gaps", "f8", 2),  # least gap of the film [m], and force of its asperities [N]
     ]
 )
 """The journal of a crank in main bearings with play, at one stage of a step."""
 
 JOURNAL_HELD = np.dtype([("touching", "i8"), ("impact", "f8"), ("squeeze", "f8", 2)])
-"""What it remembers from step to step, as of :data:`HELD`."""
+"""State of the journal that is carried from step to step, like :data:`HELD`."""
 
 ROD_STATE = np.dtype(
     [
@@ -272,18 +272,18 @@ ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
 """Columns of the crank's stages."""
 
 AT_JOINT, ALONG_X, ALONG_Y, RUBBING, NORMAL_X, NORMAL_Y = range(6)
-"""Columns of the place of a constraint force: its joint, its direction with the share that rubs
-across it, and the normal along which its equation stands."""
+"""Columns of a constraint force's place: its joint, its direction with the friction share
+across it, and the normal of its equation."""
 
 SIZE, SIZE_PER_TURN = 4, 5
-"""Right sides of the constraint equations, and after elimination the constraint forces: at constant
-crank speed, and per crank acceleration."""
+"""Right-hand sides of the constraint equations, after elimination the constraint forces: at
+constant crank speed, and per crank acceleration."""
 
 
 class Work(NamedTuple):
-    """Scratch of the march; nothing is allocated in its loop.
+    """Scratch memory of the march; nothing is allocated in its loop.
 
-    Rows 0 and 1 are the ends of the step in turn, rows 2 to 4 the stages between them.
+    Rows 0 and 1 alternate as ends of the step, rows 2 to 4 are the stages between them.
     """
 
     crank: NDArray[np.float64]  # (5, 5)
@@ -298,7 +298,7 @@ class Work(NamedTuple):
 
 
 def scratch(n_throws: int, n_bearings: int = 0, n_elastic: int = 0) -> Work:
-    """Scratch of a march, all zeros."""
+    """Scratch memory of a march, all zeros."""
     return Work(
         crank=np.zeros((5, 5)),
         stage=np.zeros((5, n_throws), STAGE),
@@ -313,7 +313,7 @@ def scratch(n_throws: int, n_bearings: int = 0, n_elastic: int = 0) -> Work:
 
 
 class LinePair(NamedTuple):
-    """Suction and discharge line of all throws, in this order; without any row there are none."""
+    """Suction and discharge line of all throws, in this order; without rows there are none."""
 
     pipes: NDArray[np.void]  # (2,) of PIPE
     states: NDArray[np.void]  # (2,) of PIPE_STATE
@@ -322,20 +322,20 @@ class LinePair(NamedTuple):
 
 
 class SharedLines(NamedTuple):
-    """The lines with the scratch of their coupling."""
+    """The lines with the scratch memory of their coupling."""
 
     lines: Any  # of LinePair
     pairs: NDArray[np.void]  # (1,) of PAIR
-    trials: NDArray[np.float64]  # (n_throws, 6): chambers at the end of a step that is tried
+    trials: NDArray[np.float64]  # chambers at the end of a trial step
 
 
 @kernel
 def pose_of(b: Any) -> Any:
-    """State of a throw at a stage by the names of its columns."""
+    """State of a throw at a stage, by the names of its columns."""
     y = b.y
     return Pose(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
 
 
 CHANGES, NOT_LOCATED, FLOORED, IN_TENSION, WITH_VAPOUR = range(5)
-"""What a run counts: contacts that closed or opened; steps with more than could be located;
+"""Counts of a run: contacts that closed or opened; steps with more than could be located;
 closings below the law's speed floor; steps with a link in tension; steps with vapour."""

@@ -1,14 +1,14 @@
-"""A crank whose journal has play in its main bearings: where it is, what it does to the throws.
+"""Crank whose journal has play in its main bearings: its motion, and its effect on the throws.
 
-The bearings are seen as one, in the plane of the throws: the crank moves parallel to itself. With
-the journal's place u from the centre of its bore, seen from the casing, the crank's mass m and the
-eccentricity e of its centre of mass along the first throw, at crank angle a,
+The bearings are lumped into one, in the plane of the throws: the crank moves parallel to itself.
+With the journal's position u from the centre of its bore, relative to the casing, the crank's mass
+m and the eccentricity e of its centre of mass along the first throw, at crank angle a,
 
     m (u'' - e w^2 (cos a, sin a) + e w' (-sin a, cos a)) = -sum F - N - m g
 
 where F are the forces of the pins on their rods and N that of the journal on its bore, by the same
-laws as those of a pin: contact and friction, or oil. About the journal's centre the crank feels the
-moments of both, and that of its own mass, which hangs as if gravity were g + u''.
+laws as for a pin: contact and friction, or oil. The moments of both act on the crank about the
+journal's centre, and so does that of its own weight, with the gravity g + u''.
 """
 
 import math
@@ -22,14 +22,14 @@ from .throw_motion import dry_pin, pin_touch
 
 @kernel
 def is_journal(k: int, t: Any) -> bool:
-    """Whether a place of contact is that of the crank's journal: it is counted after all throws."""
+    """Whether a contact index is the crank's journal, which follows all throws."""
     found: bool = k == t.throws.shape[0]
     return found
 
 
 @kernel
 def with_play(offset: Any, w: Any, row: int, t: Any) -> Any:
-    """Offset of a crank pin, see :func:`.throw_motion.crank_offset`, where the journal has play."""
+    """Offset of a crank pin, see :func:`.throw_motion.crank_offset`, with the journal's play."""
     if t.bearing.shape[0] == 0:
         return offset
     d_x, d_y, v_x, v_y = offset
@@ -39,7 +39,7 @@ def with_play(offset: Any, w: Any, row: int, t: Any) -> Any:
 
 @kernel
 def journal_margin(w: Any, row: int, t: Any) -> float:
-    """Margin of the journal's contact alone, for the search of its change [N]."""
+    """Margin of the journal's contact, for locating its change [N]."""
     if t.bearing[0].rung == JOINT_OILED:
         return NO_CHANGE
     u, held = w.journal[row, 0].y, w.journal_held[0]
@@ -50,7 +50,7 @@ def journal_margin(w: Any, row: int, t: Any) -> float:
 
 @kernel
 def _on_bore(w: Any, row: int, t: Any) -> float:
-    """Force of the journal on its bore, into its row; the moment on the crank [N m]."""
+    """Store the journal's force on its bore in its row; return the moment on the crank [N m]."""
     b, journal, held = t.bearing[0], w.journal[row, 0], w.journal_held[0]
     u, s, omega = journal.y, journal.film, w.crank[row, SPEED]
     if b.rung == JOINT_OILED:
@@ -98,7 +98,7 @@ def _on_bore(w: Any, row: int, t: Any) -> float:
 def journal_motion(w: Any, row: int, t: Any, sin_a: float, cos_a: float) -> Any:
     """Acceleration of the journal (x, y) [m/s^2] at constant crank speed; adds to the moments.
 
-    A crank that speeds up moves it by `e w' (sin a, -cos a)` more, see :func:`spun_up`.
+    The crank's acceleration w' adds `e w' (sin a, -cos a)`, see :func:`spun_up`.
     """
     b, omega = t.bearing[0], w.crank[row, SPEED]
     w.moment[0] += _on_bore(w, row, t)
@@ -116,7 +116,7 @@ def journal_motion(w: Any, row: int, t: Any, sin_a: float, cos_a: float) -> Any:
 
 @kernel
 def spun_up(w: Any, row: int, t: Any, a_x: float, a_y: float, sin_a: float, cos_a: float) -> None:
-    """Rates of the journal, from its acceleration at constant speed and that of the crank."""
+    """Rates of the journal from its acceleration at constant speed and the crank's acceleration."""
     journal = w.journal[row, 0]
     swung = t.bearing[0].eccentricity * w.crank[row, SPEED_RATE]
     journal.rate[0], journal.rate[1] = journal.y[2], journal.y[3]

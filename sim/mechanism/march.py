@@ -1,4 +1,4 @@
-"""The march over the steps: mechanism, chambers, lines and a yielding casing in turn."""
+"""March over the steps: mechanism, chambers, lines and a yielding casing in turn."""
 
 import math
 from typing import Any, NamedTuple
@@ -38,12 +38,12 @@ from .moving_bearing import on_moving_bearing
 
 
 @kernel
-def breathe(
+def step_chamber(
     chamber: Any, held: Any, liquid: Any, h: float, x: float, v: float, substeps: int
 ) -> Any:
-    """Step one chamber along its piston's path: fault, and its pressure at both ends of the next.
+    """Step one chamber along its piston's path; return fault and pressures of the next step.
 
-    The pressure [Pa] is extrapolated: the mechanism steps first.
+    That pressure [Pa] is extrapolated: the mechanism steps first.
     """
     last = chamber[0]
     fault = chamber_step(chamber, held.flow, liquid, h, chamber[6], chamber[7], x, v, substeps)
@@ -52,15 +52,15 @@ def breathe(
 
 
 @kernel
-def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: int) -> int:
-    """Step every chamber along its piston's path; its pressure for the next step."""
+def _step_chambers(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: int) -> int:
+    """Step every chamber along its piston's path; set its pressure for the next step."""
     fault = 0
     for k in range(t.throws.shape[0]):
         q, b, held = t.throws[k], w.stage[i, k], w.held[k]
         if q.pressure_rung != PRESSURE_CHAMBER:
             continue
         x, v = b.y[PISTON_X], b.y[PISTON_X_RATE]
-        own, before, after = breathe(chamber[k], held, t.liquid[k], h, x, v, q.substeps)
+        own, before, after = step_chamber(chamber[k], held, t.liquid[k], h, x, v, q.substeps)
         fault += own
         held.pressure[0], held.pressure[1] = before, after
         f = 1 + len(FORCES) * k
@@ -71,9 +71,9 @@ def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: 
 
 @kernel
 def _try_chambers(w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any) -> Any:
-    """Step every chamber under the lines' pressures that are tried: fault, and both volumes.
+    """Step every chamber at the lines' trial pressures; return fault, and both volumes.
 
-    The trials hold the outcome; volumes [m^3] as of ``CHAMBER_FLOWS``, of all throws.
+    The trials hold the result; volumes [m^3] as in ``CHAMBER_FLOWS``, summed over the throws.
     """
     fault, suction, discharge = 0, 0.0, 0.0
     for k in range(t.throws.shape[0]):
@@ -90,10 +90,10 @@ def _try_chambers(w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any) -
 
 
 @subroutine
-def _breathe_on_lines(
+def _step_chambers_and_lines(
     w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any, forces: Any, step: int
 ) -> int:
-    """Step all chambers and both lines together; pressures for the next step."""
+    """Step all chambers and both lines together; set the pressures for the next step."""
     lines, pair = shared.lines, shared.pairs[0]
     pipes, states = lines.pipes, lines.states
     nodes = (lines.suction_nodes, lines.discharge_nodes)
@@ -140,7 +140,7 @@ def _fault(w: Any, i: int) -> int:
 
 
 class MarchRecord(NamedTuple):
-    """What a run leaves behind; the last seven have one row where they are not needed."""
+    """Record of a run; the last seven have one row if they are not needed."""
 
     turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
     forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
@@ -154,7 +154,7 @@ class MarchRecord(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What a run counts, see :data:`CHANGES`."""
+    """Counts of a run, see :data:`CHANGES`."""
 
     counts: NDArray[np.int64]  # (5,)
     peak: NDArray[np.float64]  # (1,): largest normal force
@@ -168,11 +168,11 @@ def _is_compliant(q: Any, j: int) -> Any:
 
 @kernel
 def begin(w: Any, t: Any, chamber: Any) -> bool:
-    """Contacts closed from the start, chambers; true where any chamber breathes."""
-    breathing = False
+    """Set the initial contacts and chambers; return whether there are chambers."""
+    chambered = False
     for k in range(t.throws.shape[0]):
         q, b, held = t.throws[k], w.stage[0, k], w.held[k]
-        breathing |= q.pressure_rung == PRESSURE_CHAMBER
+        chambered |= q.pressure_rung == PRESSURE_CHAMBER
         chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
         held.pressure[0] = held.pressure[1] = chamber[k, 0]
         for j in range(CONTACTS):
@@ -182,7 +182,7 @@ def begin(w: Any, t: Any, chamber: Any) -> bool:
                 held.touching[j] = 1 if contact_margin(k, j, w, 0, t) < 0.0 else 0
     for n in range(w.journal.shape[1]):
         w.journal_held[n].touching = 1 if journal_margin(w, 0, t) < 0.0 else 0
-    return breathing
+    return chambered
 
 
 @kernel
@@ -225,11 +225,11 @@ def integrate(
     r: Any,
     tally: Any,
 ) -> Any:
-    """March from row 0 of the scratch; returns status code and steps done."""
+    """March from row 0 of the scratch; return status code and number of steps."""
     weight = (t.machine.gravity_x, t.machine.gravity_y)
-    breathing = begin(w, t, chamber)
+    chambered = begin(w, t, chamber)
     i, fresh = 0, False
-    # the films of the start are those of its derivative
+    # the films at the start are those of its derivative
     if r.gaps.shape[0] > 1 or r.bore_gaps.shape[0] > 1:
         derivative_of_record(w, i, 0.0, t)
     lines = shared.lines
@@ -237,14 +237,14 @@ def integrate(
     for step in range(r.forces.shape[0]):
         i, fresh = step_of_record(w, i, h, fresh, False, t, r.forces, step, tally)
         code = _fault(w, i)
-        if breathing:
+        if chambered:
             if lines.pipes.shape[0] > 0:
-                choked = _breathe_on_lines(w, i, h, t, chamber, shared, r.forces, step)
+                choked = _step_chambers_and_lines(w, i, h, t, chamber, shared, r.forces, step)
             else:
-                choked = _breathe(w, i, h, t, chamber, r.forces, step)
+                choked = _step_chambers(w, i, h, t, chamber, r.forces, step)
             if choked != 0:
                 code = 4
-            fresh = False  # the step felt an extrapolated pressure, the next one knows better
+            fresh = False  # the step used an extrapolated pressure, which is known better now
         for k in range(t.throws.shape[0]):
             tally.counts[IN_TENSION] += w.stage[i, k].link < 0.0
             tally.counts[WITH_VAPOUR] += chamber[k, 1] > 0.0

@@ -1,4 +1,4 @@
-"""A main bearing that a yielding casing carries along: how it will move in the next step."""
+"""Main bearing carried by a yielding casing: prediction of its motion in the next step."""
 
 from typing import Any
 
@@ -7,12 +7,12 @@ from .layout import FORCES, PUSHES, Machine, Tables
 
 
 @kernel
-def of_mode(
+def mode_response(
     force: float, place: float, speed: float, per_force: float, per_place: float, per_speed: float
 ) -> float:
-    """Mean acceleration of a mode over a step, or its place after it.
+    """Mean acceleration of a mode over a step, or its displacement or speed after it.
 
-    Both are exact for a force that is even over the step, however far the mode turns in it.
+    Both are exact for a force that is constant over the step, for any ratio of step to period.
     """
     return per_force * force + per_place * place + per_speed * speed
 
@@ -21,18 +21,18 @@ def of_mode(
 def settled(
     now: float, other: float, felt_now: float, felt_other: float, own: float, cross: float
 ) -> float:
-    """Acceleration of a bearing had what it carries felt just that [m/s^2].
+    """Acceleration that a bearing would have if its load had assumed just this value [m/s^2].
 
-    What is held to a bearing pushes back by its mass as soon as it feels an acceleration:
-    `a = a_0 - G a_felt`, and `a = (1 + G)^-1 a_0` had it felt that. Here it is from what was felt:
-    `a + (1 + G)^-1 G (a_felt - a)`.
+    Masses carried by a bearing react to its acceleration at once:
+    `a = a_0 - G a_assumed`, hence `a = (1 + G)^-1 a_0` for `a_assumed = a`. Computed from `a` as
+    `a + (1 + G)^-1 G (a_assumed - a)`.
 
     Parameters
     ----------
     now, felt_now : float
-        One way: by the forces of the step, and what the mechanism felt in it.
+        One direction: from the forces of the step, and as assumed by the mechanism in the step.
     other, felt_other : float
-        The same of the other way.
+        The same for the other direction.
     own, cross : float
         Entries of `(1 + G)^-1 G`.
     """
@@ -40,20 +40,21 @@ def settled(
 
 
 @kernel
-def carried_on(now: float, before: float, older: float) -> float:
-    """Mean over the next step, along the parabola through those of the last three.
+def extrapolated(now: float, before: float, older: float) -> float:
+    """Mean over the next step, extrapolated by the parabola through the last three means.
 
-    Only what pushes on the modes is carried on, and what the mechanism felt: how the modes ring
-    through the next step follows from where they are. The bearing's acceleration carried on with
-    its ringing left up to 1.5 dB in the band of the highest modes at two steps to a sample; along
-    a line such pumps are off by up to 1.3 dB, and held by up to 4.5 (docs/decisions/024).
+    Only the forces on the modes and the acceleration assumed by the mechanism are extrapolated: the
+    modes' own vibration in the next step follows from their state. Extrapolating the bearing's
+    acceleration including that vibration left up to 1.5 dB in the band of the highest modes at two
+    steps per sample; linear extrapolation leaves up to 1.3 dB in such pumps, constant values up to
+    4.5 (docs/decisions/024).
     """
     return 3.0 * (now - before) + older
 
 
 @kernel
 def _push_modes(y: Any, moved: Any, forces: Any, step: int, t: Any) -> None:
-    """Force on every mode in a step, before those in the two steps before."""
+    """Force on every mode in a step, stored before those of the two preceding steps."""
     for mode in range(y.react.shape[0]):
         force = 0.0
         for k in range(y.push.shape[1]):
@@ -71,13 +72,13 @@ def _push_modes(y: Any, moved: Any, forces: Any, step: int, t: Any) -> None:
 
 @kernel
 def _carried(y: Any, moved: Any, ahead: bool) -> Any:
-    """Acceleration of the bearing by the modes, in the step that was or in the next one."""
+    """Acceleration of the bearing from the modes, in the last step or (`ahead`) the next one."""
     along, across = 0.0, 0.0
     for mode in range(y.react.shape[0]):
         r, force = y.react[mode], moved[mode, 2]
         if ahead:
-            force = carried_on(force, moved[mode, 3], moved[mode, 4])
-        a = of_mode(force, moved[mode, 0], moved[mode, 1], r[0], r[1], r[2])
+            force = extrapolated(force, moved[mode, 3], moved[mode, 4])
+        a = mode_response(force, moved[mode, 0], moved[mode, 1], r[0], r[1], r[2])
         along += y.give[mode, 0] * a
         across += y.give[mode, 1] * a
     return along, across
@@ -85,24 +86,24 @@ def _carried(y: Any, moved: Any, ahead: bool) -> Any:
 
 @kernel
 def _move_modes(y: Any, moved: Any, late_x: float, late_y: float, h: float) -> None:
-    """Modes after the step: what felt another acceleration than the bearing had pushes on them."""
+    """Advance the modes; a wrongly assumed acceleration of the bearing acts on them as a force."""
     for mode in range(y.react.shape[0]):
         r, to, q, v = y.react[mode], y.reach[mode], moved[mode, 0], moved[mode, 1]
         force = moved[mode, 2] + y.held[mode, 0] * late_x + y.held[mode, 1] * late_y
-        moved[mode, 0] = of_mode(force, q, v, to[0], to[1], to[2])
-        moved[mode, 1] = v + h * of_mode(force, q, v, r[0], r[1], r[2])
+        moved[mode, 0] = mode_response(force, q, v, to[0], to[1], to[2])
+        moved[mode, 1] = v + h * mode_response(force, q, v, r[0], r[1], r[2])
 
 
 @kernel
 def on_moving_bearing(
     y: Any, moved: Any, felt: Any, forces: Any, step: int, h: float, weight: Any, t: Any
 ) -> Any:
-    """Tables for the next step: what turns is heavier by how the casing accelerates its bearing.
+    """Tables for the next step, with the casing's acceleration added to the weight.
 
-    In the frame of a bearing that moves, every mass feels its acceleration as more weight. Forces
-    are means over the step before; `weight` is that at rest, along and across; `felt` holds what
-    was felt in it and in the two before that. What felt another acceleration than the bearing had
-    pushes on the modes by its mass times what it was late by.
+    In the frame of a moving bearing, every mass has its acceleration as additional weight. Forces
+    are means over the last step; `weight` is that at rest, along and across; `felt` holds the
+    acceleration assumed in the last step and the two before. The error of that assumption
+    acts on the modes as a force, by the carried mass.
     """
     _push_modes(y, moved, forces, step, t)
     along, across = _carried(y, moved, False)
@@ -111,8 +112,8 @@ def on_moving_bearing(
     now_y = settled(across, along, was[1], was[0], b[1, 1], b[1, 0])
     _move_modes(y, moved, was[0] - now_x, was[1] - now_y, h)
     along, across = _carried(y, moved, True)
-    next_x = carried_on(was[0], before[0], older[0])
-    next_y = carried_on(was[1], before[1], older[1])
+    next_x = extrapolated(was[0], before[0], older[0])
+    next_y = extrapolated(was[1], before[1], older[1])
     older[0], older[1], before[0], before[1] = before[0], before[1], was[0], was[1]
     was[0] = settled(along, across, next_x, next_y, b[0, 0], b[0, 1])
     was[1] = settled(across, along, next_y, next_x, b[1, 1], b[1, 0])

@@ -1,26 +1,27 @@
-"""A pin that runs in oil: film, touching peaks and yielding wall of one joint, compiled.
+"""Pin in oil: film, asperities and yielding wall of one joint, compiled.
 
-The pin lies at d from the centre of its eye. The wall yields by ``d - s`` to where the film lets
-the pin be, s, a state of the joint. In a frame that turns with the mean of both surfaces' angular
-velocities, W, a film is squeezed but never dragged; the velocity there is ``V = s' - W x s``, and
+The pin lies at d from the centre of its eye. The wall yields by ``d - s``, where s is the film
+position of the pin, a state of the joint. In a frame that turns with the mean of both surfaces'
+angular velocities, W, a film is squeezed but not dragged; the velocity there is ``V = s' - W x s``,
+and
 
     R(s, V) V + N(s) n = K (d - s) + C (u - V),    u = d' - W x d,
 
-with the film's resistance R, the force N of touching peaks along the line of centres, and the
-wall's stiffness K and damping C. The right-hand side is the force on the rod. R depends on the
-direction of V alone (the film closes on one half of its circle), and ``R V`` is the gradient of a
-convex dissipation, so Newton's method finds V from any start in a few steps. It holds at rest, at
-the centre, where both surfaces turn against each other, and without any oil: then R is zero and
+with the film's resistance R, the force N of asperities along the line of centres, and the
+wall's stiffness K and damping C. The right-hand side is the force on the rod. R depends only on the
+direction of V (the film closes on one half of its circle), and ``R V`` is the gradient of a
+convex dissipation, so that Newton's method finds V from any start in a few steps. This holds at
+rest, at the centre, for counter-rotating surfaces, and without any oil: then R is zero and
 the wall follows the pin in free flight.
 
-The wall relaxes at ``K / (R + C)``, which no gap makes fast. Without oil C alone holds it up: there
-a share of K times the step is added, so that the wall springs back in some steps at the least; the
-force does not feel it. Peaks are taken in implicitly. So a flooded film never shortens the step of
-the mechanism.
+The wall relaxes at ``K / (R + C)``, which stays moderate at any gap. Without oil only C limits it:
+there a share of K times the step is added, so that the wall needs at least some steps to spring
+back; the added damping exerts no force on the rod. Asperities are integrated implicitly. A flooded
+film thus never reduces the step of the mechanism.
 
-Moments: shear drags pin and eye together by M; pressure acts on the pin through its own centre and
-on the eye through another, so each bears half of ``d x F`` beside it. The power lost is then
-``V R V + M w`` plus that of the wall, whatever W is.
+Moments: shear couples pin and eye by M; pressure acts on the pin through its own centre and
+on the eye through another, so each also bears half of ``d x F``. The power lost is then
+``V R V + M w`` plus that of the wall, for any W.
 
 Sources: Booker (1965), J. Basic Engineering 87(3), 537-546, for a film under a moving load in the
 frame of the mean rotation; Childs, Moes, van Leeuwen (1977), J. Lubrication Technology 99(2),
@@ -40,14 +41,14 @@ from ..jit import kernel
 
 OIL = np.dtype(
     [
-        ("short", "f8"),  # eta R L^3 / C^3, lands apart [N s/m]; 0 where the map is used
-        ("map", "f8"),  # eta R^3 L / C^3 of the same [N s/m]; 0 where the short film is used
+        ("short", "f8"),  # eta R L^3 / C^3, of the lands [N s/m]; 0 if the map is used
+        ("map", "f8"),  # eta R^3 L / C^3 of the same [N s/m]; 0 if the short film is used
         ("shear", "f8"),  # eta R^3 L / C [N m s]
         ("filled", "f8"),  # thickest gap over C that holds oil
         ("radius", "f8"),  # in the middle of the gap [m]
         ("wall_damping", "f8"),  # C [N s/m]
-        ("relaxing", "f8"),  # what is added to C where the wall springs back [N s/m]
-        ("roughness", "f8"),  # of both surfaces [m]; 0 is smooth
+        ("relaxing", "f8"),  # added to C where the wall springs back [N s/m]
+        ("roughness", "f8"),  # of both surfaces [m]; 0: smooth
         ("peaks", "f8"),  # scale of the asperity force [N]
         ("step", "f8"),  # of the mechanism [s]
         ("offset", "i8"),  # of the map's coefficients
@@ -62,17 +63,17 @@ OIL = np.dtype(
 """Oil of one joint, in SI."""
 
 DEEPEST = 1.0 - 1e-5
-"""Eccentricity beyond which the film is that of this one: what is thinner than its finish."""
+"""Eccentricity limit of the film, whose surface finish is no thinner; beyond it the film stays."""
 
 NEWTON_STEPS = 12
-_SETTLED = 1e-3  # of the velocity at the last step, whose error is the square of it
-_IMPLICIT = 0.5  # of a step, over which the peaks' stiffness is taken in
-_MOST_CLOSED = 0.7  # of the gap, in one step
+_SETTLED = 1e-3  # of the velocity in the last step; the remaining error is its square
+_IMPLICIT = 0.5  # of a step: implicit share of the asperity stiffness
+_MOST_CLOSED = 0.7  # of the gap: largest closing in one step
 
 
 @kernel
 def _resistance(x: float, y: float, v_x: float, v_y: float, o: Any, maps: Any) -> Any:
-    """Resistance of the film at s over C to velocities in a direction [N s/m]."""
+    """Resistance of the film at s, over C, to velocities in a direction [N s/m]."""
     if o.map > 0.0:
         n = 3 * o.roots * o.angles
         c = maps[o.offset : o.offset + n].reshape(3, 1, o.roots, o.angles)
@@ -84,19 +85,19 @@ def _resistance(x: float, y: float, v_x: float, v_y: float, o: Any, maps: Any) -
 
 
 class FilmPull(NamedTuple):
-    """What a film is pulled by, where it lies, and what else resists."""
+    """Forces on a film, its position, and additional resistance."""
 
-    x: float  # over C, at most as near to the bore as its finish lets it
+    x: float  # over C, limited by the surface finish
     y: float
     n_x: float  # line of centres
     n_y: float
-    u_x: float  # of the pin in the film's frame [m/s]
+    u_x: float  # velocity of the pin in the film's frame [m/s]
     u_y: float
-    spring_x: float  # of the wall [N]
+    spring_x: float  # force of the wall [N]
     spring_y: float
     pull_x: float  # [N]
     pull_y: float
-    wall_xx: float  # of the wall and the peaks [N s/m]
+    wall_xx: float  # damping of the wall and the asperities [N s/m]
     wall_xy: float
     wall_yy: float
 
@@ -115,7 +116,7 @@ def film_pull(
     c: Any,
     o: Any,
 ) -> Any:
-    """See :class:`FilmPull`; `stiff` is what the peaks add to the damping [N s/m]."""
+    """See :class:`FilmPull`; `stiff` is the damping added by the asperities [N s/m]."""
     u_x, u_y = v_x + mean * d_y, v_y - mean * d_x
     yield_x, yield_y = d_x - s_x, d_y - s_y
     deep = math.sqrt(yield_x * yield_x + yield_y * yield_y)
@@ -126,7 +127,7 @@ def film_pull(
     apart = distance > 0.0
     over = distance if apart else 1.0
     n_x, n_y = s_x / over if apart else 1.0, s_y / over
-    most = 1.0 - max(1.0 - DEEPEST, o.roughness / c.clearance)  # peaks keep the surfaces apart
+    most = 1.0 - max(1.0 - DEEPEST, o.roughness / c.clearance)  # asperities keep the surfaces apart
     share = min(1.0 / c.clearance, most / over)
     return FilmPull(
         s_x * share,
@@ -156,7 +157,7 @@ def newton_step(
     v_y: float,
     damped: float,
 ) -> Any:
-    """Next guess of the velocity V at which the film resists what pulls; whether it has settled."""
+    """Next estimate of the velocity V in equilibrium with the pull; whether it has converged."""
     a, b, c, d = r_xx + f.wall_xx, r_xy + f.wall_xy, r_yx + f.wall_xy, r_yy + f.wall_yy
     inverse = 1.0 / (a * d - b * c)
     new_x, new_y = (
@@ -170,13 +171,13 @@ def newton_step(
 
 @kernel
 def newton_damping(step: int) -> float:
-    """Share of a step of Newton's that is taken: less where two pieces send to each other."""
+    """Damping factor of a Newton step: smaller if the steps alternate between two branches."""
     return 1.0 if step < NEWTON_STEPS // 2 else 0.5
 
 
 @kernel
 def _film_velocity(f: Any, v_x: float, v_y: float, o: Any, maps: Any) -> Any:
-    """Velocity V at which the film resists what pulls, from a guess of it."""
+    """Velocity V in equilibrium with the pull, from an initial guess."""
     for step in range(NEWTON_STEPS):
         r_xx, r_xy, r_yx, r_yy = _resistance(f.x, f.y, v_x, v_y, o, maps)
         v_x, v_y, settled = newton_step(r_xx, r_xy, r_yx, r_yy, f, v_x, v_y, newton_damping(step))
@@ -200,28 +201,28 @@ def oiled_joint(
     o: Any,
     maps: Any,
 ) -> Any:
-    """Force of a pin on its rod through oil, and how the film moves.
+    """Force of an oiled pin on its rod, and the motion of the film.
 
     Parameters
     ----------
     s_x, s_y : float
-        Where the film lets the pin be, from the eye's centre [m].
+        Film position of the pin, from the eye's centre [m].
     d_x, d_y, v_x, v_y : float
-        Pin from the eye's centre [m], and how fast [m/s].
+        Pin position from the eye's centre [m], and velocity [m/s].
     pin_turn, eye_turn : float
         Angular velocities, counter-clockwise [rad/s].
     guess : numpy.ndarray of shape (2,)
-        V of the last call; holds that of this one afterwards [m/s].
+        V of the last call; replaced by that of this call [m/s].
     c, o : record of CONTACT, record of OIL
         Wall and its friction; the film.
     maps : numpy.ndarray
-        Coefficients of all maps, one after the other.
+        Coefficients of all maps, concatenated.
 
     Returns
     -------
     tuple of float
         Force on the rod x, y [N]; moments on pin and eye, counter-clockwise [N m]; rate of s x, y
-        [m/s]; least gap [m]; force of the peaks [N].
+        [m/s]; least gap [m]; force of the asperities [N].
     """
     mean, slip = 0.5 * (pin_turn + eye_turn), pin_turn - eye_turn
     gap = film_gap(s_x, s_y, c)
@@ -241,7 +242,7 @@ def film_gap(s_x: float, s_y: float, c: Any) -> float:
 
 @kernel
 def peaks_of(gap: float, o: Any) -> Any:
-    """Force of touching peaks [N], and what their stiffness adds to the damping [N s/m]."""
+    """Force of the asperities [N], and the damping equivalent to their stiffness [N s/m]."""
     peaks, stiff = asperity_force(gap, o.roughness, o.peaks)
     return peaks, stiff * (_IMPLICIT * o.step)
 
@@ -263,10 +264,10 @@ def film_load(
     c: Any,
     o: Any,
 ) -> Any:
-    """What :func:`oiled_joint` returns, once the velocity of the film is known."""
+    """Result of :func:`oiled_joint`, once the velocity of the film is known."""
     n_x, n_y = f.n_x, f.n_y
     closing = f_x * n_x + f_y * n_y - _MOST_CLOSED * max(0.0, gap) / o.step
-    crossing = max(0.0, closing)  # no film is crossed between two looks at it
+    crossing = max(0.0, closing)  # the film cannot be crossed between two evaluations
     f_x -= crossing * n_x
     f_y -= crossing * n_y
     force_x = f.spring_x + o.wall_damping * (f.u_x - f_x)
@@ -275,7 +276,7 @@ def film_load(
     angle = filled_angle(eccentricity, o.filled)
     rest = math.sqrt(1.0 - eccentricity * eccentricity)
     drag = o.shear * 2.0 * angle / rest * slip
-    # as the implicit step left it: peaks that a stage ran into carry no more than the wall gives
+    # as the implicit step left it: asperities carry no more than the wall exerts
     peaks = max(0.0, peaks + stiff * (f_x * n_x + f_y * n_y))
     sliding = friction_force(f_y * n_x - f_x * n_y + o.radius * slip, peaks, c)
     rub = sliding if peaks > 0.0 else 0.0

@@ -1,9 +1,9 @@
-"""Joint forces and accelerations of one throw, from numbers alone.
+"""Joint forces and accelerations of one throw, in scalar form.
 
-Nothing here reads or writes a table of states: a march hands in the numbers of one throw at one
-instant and gets numbers back, so that the march of one record (:mod:`.mechanism.march`) and that of
-many side by side (``sim.pump_lanes``) are driven by the same equations and reach the same bytes.
-Conditions are chosen between values rather than branched upon where many records need it.
+Nothing here reads or writes a table of states: a march passes the numbers of one throw at one
+instant and gets numbers back. So the march of one record (:mod:`.mechanism.march`) and that of
+many in parallel (``sim.pump_lanes``) use the same equations and give identical bytes.
+Values are selected rather than branched upon where the vectorised march needs it.
 """
 
 import math
@@ -31,7 +31,7 @@ class Pose(NamedTuple):
 
 
 class PinLoad(NamedTuple):
-    """What a joint does: force on the rod or the piston [N], moments on pin and eye [N m]."""
+    """Load of a joint: force on the rod or the piston [N], moments on pin and eye [N m]."""
 
     x: float
     y: float
@@ -40,7 +40,7 @@ class PinLoad(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """State of one contact: what presses [N], overlap [m], and what decides its change."""
+    """State of one contact: normal force [N], overlap [m], and the criteria of its change."""
 
     normal: float
     overlap: float
@@ -49,7 +49,7 @@ class Touch(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Accelerations of a throw, and what the crank and the casing feel of it."""
+    """Accelerations of a throw, and its effect on crank and casing."""
 
     rod_x: float
     rod_y: float
@@ -63,7 +63,7 @@ class Rates(NamedTuple):
 def crank_offset(
     p: Any, omega: float, q: Any, sin_a: float, cos_a: float, sin_b: float, cos_b: float
 ) -> Any:
-    """Crank pin from its eye's centre (x, y) [m], and how fast (x, y) [m/s]."""
+    """Crank pin relative to its eye's centre (x, y) [m], and velocity (x, y) [m/s]."""
     turn = omega * q.crank_radius
     swing = p.beta_rate * q.rod_arm
     return (
@@ -76,7 +76,7 @@ def crank_offset(
 
 @kernel
 def wrist_offset(p: Any, q: Any, sin_b: float, cos_b: float) -> Any:
-    """Wrist pin from its eye's centre (x, y) [m], and how fast (x, y) [m/s]."""
+    """Wrist pin relative to its eye's centre (x, y) [m], and velocity (x, y) [m/s]."""
     swing = p.beta_rate * q.rod_centre
     return (
         p.piston_x - p.rod_x - q.rod_centre * cos_b,
@@ -90,9 +90,9 @@ def wrist_offset(p: Any, q: Any, sin_b: float, cos_b: float) -> Any:
 def worn_eye(offset: Any, beta_rate: float, sin_b: float, cos_b: float, c: Any) -> Any:
     """Offset of the crank pin, see :func:`crank_offset`, from the nearest centre of a worn eye.
 
-    A pin that has sunk into one side of its eye, towards the wrist pin, has left the room of two
-    half circles and what is between them: their centres lie on a line along the rod, as long as
-    the contact's `slot`. Returned after it is how far along that line the centre lies [m].
+    A pin that has worn into one side of its eye, towards the wrist pin, can move in two half
+    circles and the area between them: their centres lie on a line along the rod, as long as
+    the contact's `slot`. Also returns the centre's distance along that line [m].
     """
     d_x, d_y, v_x, v_y = offset
     along = min(max(d_x * cos_b - d_y * sin_b, 0.0), c.slot)
@@ -103,14 +103,14 @@ def worn_eye(offset: Any, beta_rate: float, sin_b: float, cos_b: float, c: Any) 
 
 @kernel
 def slot_moment(pin: Any, along: float, sin_b: float, cos_b: float) -> Any:
-    """Load of a pin whose force acts so far along the rod from its eye's centre [m]."""
+    """Load of a pin whose force acts at a distance along the rod from its eye's centre [m]."""
     turning = along * (pin.x * sin_b + pin.y * cos_b)
     return PinLoad(pin.x, pin.y, pin.on_pin, pin.on_eye + turning)
 
 
 @kernel
 def polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
-    """Length, its rate, and direction; a centred pin has the stroke's, never NaN."""
+    """Length, its rate, and direction; a centred pin gets the stroke's direction, not NaN."""
     distance = math.sqrt(d_x * d_x + d_y * d_y)
     apart = distance > 0.0
     inverse = 1.0 / (distance if apart else 1.0)
@@ -120,7 +120,7 @@ def polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
 
 @kernel
 def margin(overlap: float, force: float, touching: bool, c: Any) -> Any:
-    """Positive while the contact stays as it is, negative once it should change [N]."""
+    """Positive while the contact stays unchanged, negative once it should change [N]."""
     elastic = c.stiffness * overlap
     sticky = c.law == LAW_KELVIN_VOIGT and c.release == RELEASE_AT_ZERO_FORCE
     open_ = -min(elastic, force) if sticky else -elastic
@@ -166,7 +166,7 @@ def dry_pin(
 ) -> Any:
     """Load of a pin with clearance on its rod, and the state of the contact.
 
-    `spin` is the sliding velocity that comes from turning alone [m/s].
+    `spin` is the sliding velocity from rotation alone [m/s].
     """
     touch, n_x, n_y = pin_touch(d_x, d_y, v_x, v_y, touching, impact, c)
     law = touch.normal if touching else 0.0
@@ -182,14 +182,14 @@ def dry_pin(
 def seal_drag(speed: float, pressure: float, q: Any) -> Any:
     """Coulomb friction of a piston's rings or packing, along x on the piston [N].
 
-    Their tension and the gauge pressure in the cylinder press them on.
+    They are pressed on by their tension and by the gauge pressure in the cylinder.
     """
     pressed = q.seal_friction + q.seal_friction_area * abs(pressure)
     sharp = q.seal_friction_speed
     return -pressed * speed / math.sqrt(speed * speed + sharp * sharp + _REST)
 
 
-_REST = 1e-30  # [m^2/s^2]: a record of zeros has no seal, and no division by zero
+_REST = 1e-30  # [m^2/s^2]: avoids division by zero in a record of zeros, which has no seal
 
 
 @kernel
@@ -233,8 +233,8 @@ def guide_end(
 ) -> Any:
     """Force of a guide on one end of the piston (x, y), its moment on it, and its two contacts.
 
-    A guide with clearance holds an end at its upper or its lower corner, never at both. So force
-    and friction are those of one corner: the one that touches, or of none the deeper one.
+    A guide with clearance holds an end at its upper or its lower corner, never at both. Force
+    and friction are those of the corner in contact, or of the deeper one if neither is.
     """
     at_upper, speed_u, x_u, y_u = corner(p, q, along, 1.0, sin_t, cos_t, c.clearance)
     at_lower, speed_l, x_l, y_l = corner(p, q, along, -1.0, sin_t, cos_t, c.clearance)
@@ -277,7 +277,7 @@ def free_motion(
 ) -> Any:
     """Accelerations under the applied loads, before any constraint force.
 
-    `along` is what liquid and seal do to the piston along the stroke [N].
+    `along` is the force of liquid and seal on the piston along the stroke [N].
     `inv_px` is the inverse mass of the piston along the stroke, its liquid included [1/kg].
     """
     rod_x = pin.x + wrist.x - m.gravity_x * q.rod_mass
@@ -298,10 +298,10 @@ def free_motion(
 def held_wrist(
     q: Any, m: Any, p: Any, free: Any, inv_px: float, sin_b: float, cos_b: float, holds: float
 ) -> Any:
-    """Accelerations and force on the rod (x, y) where an ideal wrist pin holds rod and piston.
+    """Accelerations and force on the rod (x, y) if an ideal wrist pin joins rod and piston.
 
-    Its two constraints in closed form: the way a worn crank pin takes. `holds` is 1, or 0 where
-    there is no such pin.
+    Its two constraints in closed form, used with a worn crank pin. `holds` is 1, or 0 without
+    such a pin.
     """
     d_x, d_y, v_x, v_y = wrist_offset(p, q, sin_b, cos_b)
     inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
@@ -328,7 +328,7 @@ def held_wrist(
 
 @kernel
 def held_back(distance: float, speed: float, m: Any) -> Any:
-    """Baumgarte's term: acceleration that brings a drifting constraint back [m/s^2]."""
+    """Baumgarte's term: acceleration that corrects a drifting constraint [m/s^2]."""
     return m.baumgarte * (2.0 * speed + m.baumgarte * distance)
 
 
@@ -348,8 +348,8 @@ def motor_moment(speed: float, m: Any) -> Any:
 
 @kernel
 def crank_load(moment: float, sin_a: float, cos_a: float, a_x: float, a_y: float, m: Any) -> Any:
-    """Moment on the crank with the weight of its own unbalance [N m].
+    """Moment on the crank including the weight of its own unbalance [N m].
 
-    `a_x` and `a_y` are what its journal accelerates by [m/s^2].
+    `a_x` and `a_y` are the acceleration of its journal [m/s^2].
     """
     return moment + m.static_moment * ((m.gravity_x + a_x) * sin_a - (m.gravity_y + a_y) * cos_a)

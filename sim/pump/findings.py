@@ -1,4 +1,4 @@
-"""What is told of a run beside its channels: numerics, warnings, truth."""
+"""Results of a run in addition to its channels: numerics, warnings, truth."""
 
 import math
 from typing import Any
@@ -26,44 +26,44 @@ from ..pump_setup.films import bore_temperature, film_temperature_of
 from ..pump_setup.joints import joint_rungs
 from ..scene.pump import PumpScene
 from ..scene.pump_joints import OILED_RUNGS
-from .gathering import Gathering, breathes
+from .gathering import Gathering, has_chambers
 from .run_plan import RunPlan
 from .scene_run import pin_offsets
 from .tearing import lowest_under_pull, torn_by_pull
 
 _LIFT_LEFT = 0.05
-"""Of the stop's lift: a valve that is open by more so long after its stroke does not close."""
+"""Share of the stop's lift: a valve still open by more, late in its idle stroke, fails to close."""
 
-_STABLE = 2.785  # step times rate of Runge-Kutta 4, on the negative real axis
+_STABLE = 2.785  # step times rate of Runge-Kutta 4: stability limit on the negative real axis
 
-_ROUGHNESS = 0.4e-6  # m, of a ground pin and a bored eye together, where none is given
-_MOSTLY = 0.5  # of all contacts: the floor, not the law, decides what they lose
+_ROUGHNESS = 0.4e-6  # m, combined, of a ground pin and a bored eye, if none is given
+_MOSTLY = 0.5  # of all contacts: beyond this share the floor rather than the law sets the damping
 
 _LATE = math.radians(60.0)  # after the dead centre; a fast pump's valves close 30 degrees late
 
 
 def oiled_pins(scene: PumpScene) -> NDArray[np.bool_]:
-    """Which pins run in oil [shape=(n_throws, 2)]."""
+    """Whether each pin is oiled [shape=(n_throws, 2)]."""
     rungs = [joint_rungs(scene, throw)[:GUIDE] for throw in range(len(scene.throws))]
     return np.asarray(np.array(rungs) == JOINT_OILED)
 
 
-def judged(gathered: Gathering, lift: float) -> Status:
-    """A column that tears; a valve that never shuts in time, its spring too soft for the speed."""
+def run_status(gathered: Gathering, lift: float) -> Status:
+    """Status of a run: a torn liquid column, or a valve that never closes in time."""
     if torn_by_pull(gathered.plan.scene, gathered.pull):
         return Status.VAPOUR
     return Status.VALVE_OPEN if lift > _LIFT_LEFT else Status.OK
 
 
 def largest_lift_left(gathered: Gathering) -> float:
-    """Least lift left in the idle strokes of any free valve, over the stop's: what recurs."""
+    """Largest lift that recurs in every idle stroke of some free valve, over the stop's lift."""
     scene, settled = gathered.plan.scene, gathered.plan.kept.start
     lifts = gathered.lifts[settled:]
-    if not len(lifts):  # nothing breathes; or a run has failed before
+    if not len(lifts):  # no chambers, or a run that failed earlier
         return 0.0
     largest = 0.0
     for throw in np.flatnonzero(~gathered.vapour).tolist():
-        # vapour keeps a suction valve open until it is refilled, whatever its spring
+        # vapour keeps a suction valve open until the cylinder is refilled, for any spring
         pressure = scene.pressures(throw)
         angle = gathered.turns[settled:, 0, 0] + scene.throws[throw].phase
         sides = (("suction", pressure.suction_valve, 0), ("discharge", pressure.discharge_valve, 1))
@@ -81,7 +81,7 @@ def _rung_of(part: Any) -> str:
 
 
 def run_numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str, float | int | str]:
-    """Rungs, steps and what they resolve, by name."""
+    """Rungs, steps and what the steps resolve, by name."""
     scene = gathered.plan.scene
     steps, resolved = run.steps, run.step * contact_rate(scene)
     numerics: dict[str, float | int | str] = {
@@ -98,7 +98,7 @@ def run_numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str,
         "steps": steps,
         "step_per_contact_time": resolved,
         "stability_margin": 1 - resolved / _STABLE,
-        # Runge-Kutta 4 turns the fastest contact too slowly by this share
+        # share by which Runge-Kutta 4 underestimates the phase of the fastest contact
         "estimated_error": resolved**4 / 120,
         "contact_changes": run.contact_changes,
         "cuts_refused": run.cuts_refused,
@@ -120,7 +120,7 @@ def run_numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str,
         numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
     if gathered.films:
         numerics |= _film_numerics(gathered)
-    if breathes(scene):
+    if has_chambers(scene):
         numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
         numerics["lift_left"] = lift
     for side, parted in zip(("suction", "discharge"), run.parted_steps, strict=False):
@@ -131,7 +131,7 @@ def run_numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str,
 
 
 def _film_numerics(gathered: Gathering) -> dict[str, float | int | str]:
-    """How thin the films got, and how warm the warmest is where a heat balance says it."""
+    """Least film thickness, and the highest film temperature if there is a heat balance."""
     scene = gathered.plan.scene
     pins = zip(*np.nonzero(oiled_pins(scene)), strict=True)
     warm = [film_temperature_of(scene, int(throw), int(joint)) for throw, joint in pins]
@@ -140,7 +140,7 @@ def _film_numerics(gathered: Gathering) -> dict[str, float | int | str]:
 
 
 def _has_floor(scene: PumpScene) -> bool:
-    """Whether a contact law takes the speed of each impact, and so has a least one."""
+    """Whether a contact law depends on the impact speed, and so has a speed floor."""
     parts = (scene.joint.crankpin, scene.joint.wristpin, scene.joint.guide)
     return any(
         part is not None and part.law != "kelvin-voigt" and part.restitution_speed is None
@@ -149,7 +149,7 @@ def _has_floor(scene: PumpScene) -> bool:
 
 
 def run_warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
-    """What a user must know of a run that did not fail."""
+    """Warnings about a run that did not fail."""
     found = []
     if float(numerics.get("tension_share", 0.0)) > 0:
         found.append(
@@ -166,21 +166,21 @@ def run_warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
         if share > 0:
             found.append(
                 f"the liquid column of the {side} line parts in {share:.1%} of the steps: vapour "
-                "is counted at the nodes of the line alone, so the pressures when it closes are "
+                "is computed only at the nodes of the line, so the pressures when it closes are "
                 "those of a coarse model; raise the pressure at its far end, shorten it, or "
                 "give it a damper"
             )
     if float(numerics.get("lines_unsettled_share", 0.0)) > 0:
         found.append(
-            f"pump and lines agree to a thousandth of the pressure in all but "
-            f"{float(numerics['lines_unsettled_share']):.2%} of the steps: what is left over is "
-            "made up for in the next ones; shorten numerics.step, or give the lines dampers"
+            f"pump and lines agree to a thousandth of the pressure except in "
+            f"{float(numerics['lines_unsettled_share']):.2%} of the steps: the remainder is "
+            "corrected in the next steps; shorten numerics.step, or give the lines dampers"
         )
     if float(numerics.get("floored_share", 0.0)) > _MOSTLY:
         found.append(
             f"{float(numerics['floored_share']):.1%} of the contacts closed more slowly than "
             f"{float(numerics['speed_floor_m_s']):.3g} m/s, the floor of the contact law: they "
-            "were damped less than the law says"
+            "were damped less than by the law"
         )
     if int(numerics.get("clipped_samples", 0)) > 0:
         found.append(f"{numerics['clipped_samples']} samples clipped; widen the sensor's range")
@@ -188,7 +188,7 @@ def run_warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
 
 
 def film_warnings(scene: PumpScene, numerics: dict[str, float | int | str]) -> tuple[str, ...]:
-    """Films that are thinner than their surfaces are rough, where no rung knows of peaks."""
+    """Warn of films thinner than the surface roughness, if the rung has no asperities."""
     joints = (scene.joint.crankpin, scene.joint.wristpin, scene.crank.bearing)
     pins = [part for part in joints if part is not None]
     oiled = [part for part in pins if part.rung in OILED_RUNGS and part.oil is not None]
@@ -200,28 +200,28 @@ def film_warnings(scene: PumpScene, numerics: dict[str, float | int | str]) -> t
         return ()
     return (
         f"least film of the pins = {film:.2g} m is below a roughness of {rough:.2g} m, where "
-        "peaks touch; set the joint's rung to 'mixed'",
+        "asperities touch; set the joint's rung to 'mixed'",
     )
 
 
 def motor_warnings(scene: PumpScene, speed: NDArray[np.float64]) -> tuple[str, ...]:
-    """A motor that its load has slowed beyond its largest moment."""
+    """Warn of a motor slowed beyond its breakdown moment."""
     motor = scene.drive.motor
     if scene.drive.rung != "motor" or motor is None:
         return ()
-    later = speed[3 * len(speed) // 4 :]  # the mean of a part, as the speed swings
+    later = speed[3 * len(speed) // 4 :]  # mean over a part, as the speed fluctuates
     last = later.mean() / math.tau
     least = scene.drive.synchronous_speed * (1 - motor.breakdown_slip)
     if last >= least:
         return ()
     return (
         f"speed at the end = {60 * last:.3g} rpm is below {60 * least:.3g} rpm, where the motor "
-        "pulls hardest: it stalls; raise drive.motor.breakdown_moment or lower the load",
+        "has its largest moment: it stalls; raise drive.motor.breakdown_moment or lower the load",
     )
 
 
 def exciter_truth(plan: RunPlan, pushes: tuple[Push, ...]) -> dict[str, Any]:
-    """Forces of the exciters at the sample instants [shape=(n_samples, n_exciters)] [N]."""
+    """Exciter forces at the sample instants [shape=(n_samples, n_exciters)] [N]."""
     if not pushes:
         return {}
     forces = np.stack([push.along for push in pushes], axis=1)
@@ -229,7 +229,7 @@ def exciter_truth(plan: RunPlan, pushes: tuple[Push, ...]) -> dict[str, Any]:
 
 
 def run_truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
-    """Forces, low-passed as the signal is, and states at the sample instants, per throw."""
+    """Forces, low-passed like the signal, and states at the sample instants, per throw."""
     turned = plan.turned(plan.at_samples(run.turns[:, 0]))
     truth: dict[str, Any] = {"state_alpha": turned}
     truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
@@ -238,7 +238,9 @@ def run_truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
     if run.journal is not None:
         columns += [force_column(name, 0, len(throws)) for name in CRANK_FORCES]
         truth["main_bearing_offset_m"] = plan.at_samples(run.journal[:, :2])
-    force = decimate(run.forces[:, [0, *columns]], plan.factor)[plan.kept]  # it costs by the column
+    force = decimate(run.forces[:, [0, *columns]], plan.factor)[
+        plan.kept
+    ]  # only the columns needed
     truth["drive_moment_n_m"] = force[:, 0]
     if run.bore_gaps is not None:
         truth["main_bearing_gap_m"] = plan.at_samples(run.bore_gaps[:, 0])
@@ -268,7 +270,7 @@ def _throw_truth(
     turned: NDArray[np.float64],
     force: NDArray[np.float64],
 ) -> list[tuple[str, NDArray[np.float64]]]:
-    assert run.bodies is not None  # truth was asked for
+    assert run.bodies is not None  # requested with the truth
     bodies = plan.at_samples(run.bodies[:, throw])
     journal = None if run.journal is None else plan.at_samples(run.journal)
     flex = None if run.flex is None else plan.at_samples(run.flex[:, throw])

@@ -1,4 +1,4 @@
-"""Gathered while a pump runs: forces on its casing, and the response at its sensors."""
+"""Data collected while a pump runs: forces on its casing, and the response at its sensors."""
 
 import math
 from functools import partial
@@ -15,7 +15,7 @@ from ..parts.casing import CasingMode, specific_key
 from ..pump_setup.joints import has_main_play
 from ..pump_setup.yielding import rubs_in_guide, throw_on_casing
 from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
-from ..scene.pump_hydraulics import BREATHING_RUNGS
+from ..scene.pump_hydraulics import CHAMBER_RUNGS
 from ..scene.scene import SceneError
 from .pressure_sensors import cylinder_pressure
 from .push import pushed_places
@@ -23,40 +23,40 @@ from .run_plan import RunPlan
 
 
 class Gathering:
-    """What a recording needs of a run, gathered step by step while the mechanism runs.
+    """Collects the data of a recording step by step while the mechanism runs.
 
-    So that forces of all steps need not be kept: they go through the casing at once.
+    Forces pass through the casing at once, so that those of all steps need not be kept.
 
     Parameters
     ----------
     plan : RunPlan
     seed : int
-        Of the recording.
+        Seed of the recording.
     columns : tuple of int or None
-        Of all forces: the rows of those that will be added; None for all.
+        Rows of forces that will be added, among all forces; None for all.
     truth : bool
-        Keep what :data:`GATHERED_TRUTH` names as well.
+        Also keep the data named in :data:`GATHERED_TRUTH`.
 
     Attributes
     ----------
     plan, seed
-        As given.
+        As passed.
     pushes : tuple of Push
         Forces of the mounted exciters at all steps.
     casing : ModalCasing or MeasuredCasing
-        Under all forces that were added.
+        Casing under all forces added so far.
     turns : numpy.ndarray [shape=(n, 2, 2)]
-        Crank angle [rad] and speed [rad/s] where the first step of every sample begins and ends;
-        n is 0 where a crank of constant speed drives what does not breathe.
+        Crank angle [rad] and speed [rad/s] at the start and end of every sample's first step;
+        n is 0 for a crank of constant speed without chambers.
     lifts : numpy.ndarray [shape=(n, n_throws, 2)]
-        Of suction and discharge valve [m], where the first step of every sample begins; n is 0
-        where nothing breathes.
+        Lift of suction and discharge valve [m] at the start of every sample's first step; n is 0
+        without chambers.
     vapour : numpy.ndarray [shape=(n_throws,)]
         Whether a chamber ever held vapour.
     pull : numpy.ndarray [shape=(n_throws,)]
         Largest force of the liquid along x on each piston after settling [N], a mean over its step.
     mean_speed : float
-        Of the crank over all steps [rad/s].
+        Mean crank speed over all steps [rad/s].
     """
 
     def __init__(
@@ -89,11 +89,11 @@ class Gathering:
         ]
         self._knowing = Decimation(len(self._known), plan.n_steps, plan.factor) if truth else None
         self._steps = self._samples = 0
-        breathing = breathes(scene)
-        turning = breathing or scene.drive.rung != "constant-speed"
+        chambered = has_chambers(scene)
+        turning = chambered or scene.drive.rung != "constant-speed"
         most = -(-plan.n_steps // plan.factor)
         self._turns = np.empty((most if turning else 0, 2, 2))
-        self._lifts = np.empty((most if breathing else 0, n_throws, 2))
+        self._lifts = np.empty((most if chambered else 0, n_throws, 2))
         self.vapour = np.zeros(n_throws, dtype=bool)
         self.pull = np.full(n_throws, -math.inf)
         self._ends = [0.0, 0.0]
@@ -106,27 +106,27 @@ class Gathering:
         chambers: NDArray[np.float64] | None,
         gaps: NDArray[np.float64] | None = None,
     ) -> None:
-        """Take the next steps.
+        """Add the next steps.
 
         Parameters
         ----------
         turns : numpy.ndarray [shape=(n + 1, 2)]
-            As of :class:`CrankRun`, from where the first of them begins.
+            As in :class:`CrankRun`, from the start of the first step.
         forces : numpy.ndarray [shape=(n_columns, n)]
         chambers : numpy.ndarray [shape=(n + 1, n_throws, 3)] or None
             Columns :data:`GATHERED` of ``CHAMBER_STATE``.
         gaps : numpy.ndarray [shape=(n + 1, n_pins, 2)] or None
-            Of the oiled pins: least film [m], and what its touching peaks carry [N].
+            For the oiled pins: least film [m], and force of its asperities [N].
         """
         first, n, factor = self._steps, forces.shape[1], self.plan.factor
         if not first:
             self._ends[0] = float(turns[0, 0])
         self._ends[1] = float(turns[-1, 0])
         self._steps += n
-        early = -first % factor  # steps before one that begins with a sample
+        early = -first % factor  # steps before the next first step of a sample
         begin, self._samples = self._samples, self._samples + len(range(early, n, factor))
         found = slice(begin, self._samples)
-        # column by column: numpy takes ten times as long over many rows of two
+        # column by column: numpy is ten times slower over many rows of two
         for column in range(2 if len(self._turns) else 0):
             self._turns[found, 0, column] = turns[early:n:factor, column]
             self._turns[found, 1, column] = turns[early + 1 :: factor, column]
@@ -150,7 +150,7 @@ class Gathering:
             self.pull[throw] = max(self.pull[throw], found)
 
     def _note_films(self, gaps: NDArray[np.float64], first: int) -> None:
-        """Least film, and how often peaks touch, where steps of the samples begin."""
+        """Record least film and asperity contact at the starts of the samples' steps."""
         kept, factor = self.plan.kept, self.plan.factor
         begin = max(0, kept.start * factor - first)
         found = gaps[begin : max(begin, kept.stop * factor - first)]
@@ -161,8 +161,8 @@ class Gathering:
 
     @property
     def films(self) -> dict[str, float]:
-        """Least film of all oiled pins, and how long rough peaks touched; empty without either."""
-        if not self._looks:  # or a run that failed while it settled
+        """Least film of all oiled pins, and share of asperity contact; empty without data."""
+        if not self._looks:  # no oiled pins, or the run failed while settling
             return {}
         return {"min_film_m": self._least_gap, "rubbing_share": self._rubs / self._looks}
 
@@ -173,7 +173,7 @@ class Gathering:
         first: int,
         rows: NDArray[np.float64],
     ) -> None:
-        """Write forces on the casing [shape=(n_places, n)]: the mechanism's, and exciters'."""
+        """Write forces on the casing [shape=(n_places, n)]: of the mechanism and the exciters."""
         n = forces.shape[1]
         for row, ((source, sign), *others) in zip(rows, self._sources.values(), strict=False):
             np.multiply(forces[source], sign, out=row)
@@ -196,18 +196,18 @@ class Gathering:
 
     @property
     def mean_speed(self) -> float:
-        """Of the crank; see the class."""
+        """Mean crank speed; see the class."""
         return (self._ends[1] - self._ends[0]) / (self._steps * self.plan.step)
 
     def turned(self) -> NDArray[np.float64]:
-        """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
+        """Crank angle at the samples [rad]: exact at constant speed, else as computed."""
         if not len(self.turns):
             return self.plan.angle
         angle = self.turns[self.plan.kept, :, 0]
         return self.plan.turned(0.5 * (angle[:, 0] + angle[:, 1]))
 
     def truth(self) -> dict[str, NDArray[np.float64]]:
-        """What :data:`GATHERED_TRUTH` names of the truth; empty where it was not asked for."""
+        """Truth named in :data:`GATHERED_TRUTH`; empty if not requested."""
         if self._knowing is None:
             return {}
         found = {"state_alpha": self.turned()}
@@ -228,11 +228,11 @@ class Gathering:
 _GATHERED_FORCES = ("pin_x", "pin_y", "guide_y", "piston_x")
 
 GATHERED_TRUTH = ("state_alpha", "pin_force_n", "guide_force_n", "piston_pressure_force_n")
-"""Of a run's truth: what is at hand without its states, by throw as there."""
+"""Part of a run's truth available without its states, with one array for all throws."""
 
 
 def _row_of(force: str, throw: int, n_throws: int, columns: tuple[int, ...] | None) -> int:
-    """Row of a force of a throw among those that are kept."""
+    """Row of a throw's force among those kept."""
     column = force_column(force, throw, n_throws)
     return column if columns is None else columns.index(column)
 
@@ -240,10 +240,10 @@ def _row_of(force: str, throw: int, n_throws: int, columns: tuple[int, ...] | No
 def _sources(
     scene: PumpScene, columns: tuple[int, ...] | None
 ) -> dict[str, list[tuple[int, float]]]:
-    """Rows of forces, with their signs, behind every place of the casing where the crank pushes.
+    """Rows of forces, with signs, for every place where the crank mechanism acts on the casing.
 
     Reactions of bearing and guide, liquid on the cylinder head, valves on their seats. Keys are
-    those of a mode shape, a place or that of one throw; throws that one key stands for add up.
+    those of a mode shape: a place, or a place of one throw; a key for several throws sums them.
     """
     found: dict[str, list[tuple[int, float]]] = {}
     for throw in range(len(scene.throws)):
@@ -253,13 +253,13 @@ def _sources(
     return found
 
 
-def breathes(scene: PumpScene) -> bool:
-    """Whether any chamber has valves."""
-    return any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
+def has_chambers(scene: PumpScene) -> bool:
+    """Whether any cylinder is a chamber with valves."""
+    return any(scene.pressures(k).rung in CHAMBER_RUNGS for k in range(len(scene.throws)))
 
 
 def _crank_throws(plan: RunPlan, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the unbalance of the crank does to its bearing (x, y), but for its steady weight."""
+    """Force of the crank's unbalance on its bearing (x, y), without its steady weight."""
     scene = plan.scene
     angle = 0.5 * (turns[:-1, 0] + turns[1:, 0]) + scene.throws[0].phase
     speed = 0.5 * (turns[:-1, 1] + turns[1:, 1])
@@ -271,7 +271,7 @@ def _crank_throws(plan: RunPlan, turns: NDArray[np.float64]) -> NDArray[np.float
 
 
 def _force_key(scene: PumpScene, place: str, throw: int) -> str:
-    """Key under which the casing knows a force: that of its throw where there is one."""
+    """Key of a force in the casing's shapes: with its throw if there is such a key."""
     if scene.casing.frf is not None:
         return f"{place}_{throw}"
     keys = {key for mode in scene.casing.modes for key in mode.shape}
@@ -279,13 +279,13 @@ def _force_key(scene: PumpScene, place: str, throw: int) -> str:
 
 
 def _split(key: str) -> tuple[str, int]:
-    """Place and throw of a key; a place for all throws is that of the first."""
+    """Place and throw of a key; a place for all throws counts as that of the first."""
     place, _, throw = key.rpartition("_")
     return (key, 1) if key in FORCE_PLACES else (place, int(throw))
 
 
 def driven_casing(plan: RunPlan, places: tuple[str, ...]) -> ModalCasing | MeasuredCasing:
-    """The casing of a scene, to be driven at these places."""
+    """Create the casing of a scene, driven at these places."""
     step_rate = plan.scene.sample_rate * plan.factor
     accelerance = measured_casing(plan.scene, places)
     if accelerance is not None:
@@ -293,7 +293,7 @@ def driven_casing(plan: RunPlan, places: tuple[str, ...]) -> ModalCasing | Measu
     return ModalCasing(casing_modes(plan.scene, places), step_rate, plan.factor, plan.n_steps)
 
 
-def heard_by_sensors(
+def sensor_response(
     casing: ModalCasing | MeasuredCasing,
 ) -> tuple[NDArray[np.float64], dict[str, float | int | str]]:
     """Acceleration at every accelerometer, and the numerics of a measured casing."""
@@ -309,13 +309,13 @@ def heard_by_sensors(
 
 
 def measured_casing(scene: PumpScene, places: tuple[str, ...] = ()) -> Accelerance | None:
-    """Accelerance from the scene's file, None where the casing is given as modes.
+    """Accelerance from the scene's file; None if the casing is given as modes.
 
     Parameters
     ----------
     scene : PumpScene
     places : tuple of str
-        Columns wanted; those of :func:`measured_places` by default.
+        Columns to read; by default those of :func:`measured_places`.
 
     Raises
     ------
@@ -333,7 +333,7 @@ def measured_casing(scene: PumpScene, places: tuple[str, ...] = ()) -> Acceleran
 
 
 def measured_places(scene: PumpScene) -> tuple[str, ...]:
-    """Places where the mechanism pushes on a measured casing, by throw.
+    """Places where the mechanism acts on a measured casing, by throw.
 
     Examples
     --------
@@ -347,7 +347,7 @@ def measured_places(scene: PumpScene) -> tuple[str, ...]:
         for place in (
             *CRANK_PLACES,
             *(GUIDE_PLACES if rubs_in_guide(scene, throw) else ()),
-            *(VALVE_PLACES if scene.pressures(throw).rung in BREATHING_RUNGS else ()),
+            *(VALVE_PLACES if scene.pressures(throw).rung in CHAMBER_RUNGS else ()),
         )
     )
 
@@ -358,9 +358,9 @@ def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> CasingModes:
     Parameters
     ----------
     scene : PumpScene
-        Whose casing is given as modes.
+        A scene with a casing given as modes.
     places : tuple of str
-        Keys of mode shapes: of forces, or sensors that are pushed.
+        Keys of mode shapes, for forces or excited sensors.
 
     Examples
     --------
@@ -382,5 +382,5 @@ def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> CasingModes:
 
 
 def _participation(mode: CasingMode, key: str) -> float:
-    """Shape at the key of a force, or at a sensor that is pushed."""
+    """Shape at the key of a force, or at an excited sensor."""
     return mode.shape[key] if key in mode.shape else casing_inputs(mode.shape, *_split(key))

@@ -1,4 +1,4 @@
-"""Rungs of a reciprocating pump, from the cheapest to the best, and what a run of it costs."""
+"""Rungs of a reciprocating pump, from the cheapest to the best, and the cost of a run."""
 
 import math
 from collections.abc import Iterator
@@ -42,15 +42,15 @@ JOINT_RUNGS = (
     Rung(
         name="compliant",
         assumes="free flight and the contact law's force, with friction, in the clearance circle",
-        reference="Xia et al. 2017, eqs 1-15 with their signs mended",
+        reference="Xia et al. 2017, eqs 1-15 with corrected signs",
         valid="penetration below a tenth of the pin's radius, and 4 clearances under the load",
         needs="a clearance, a contact law with its stiffness; of a guide the piston's inertia",
         nanoseconds_per_step=140.0,
     ),
     Rung(
         name="film-short",
-        assumes="a short oil film on a yielding wall; flooded, or filled where the gap is thin",
-        reference="Ocvirk 1952; Booker 1965 for a load that turns",
+        assumes="a short oil film on a yielding wall; flooded, or filled in thin gaps only",
+        reference="Ocvirk 1952; Booker 1965 for a rotating load",
         valid="length up to a quarter of the diameter; film thicker than the roughness",
         needs="oil with its length",
         nanoseconds_per_step=550.0,
@@ -65,14 +65,14 @@ JOINT_RUNGS = (
     ),
     Rung(
         name="mixed",
-        assumes="film and touching peaks share the load; short where starved, else finite",
+        assumes="film and asperities share the load; short where starved, else finite",
         reference="Greenwood, Tripp 1971",
         valid="roughness far below the clearance; laminar, isothermal",
         needs="oil with its length and roughness",
         nanoseconds_per_step=1000.0,
     ),
 )
-"""Rungs of crank pin and wrist pin; of main bearings, which no link can hold, all others."""
+"""Rungs of crank pin and wrist pin; the main bearings have all except the link."""
 
 GUIDE_RUNGS = tuple(rung for rung in JOINT_RUNGS if rung.name in ("ideal", "compliant"))
 """Rungs of a guide."""
@@ -80,19 +80,19 @@ GUIDE_RUNGS = tuple(rung for rung in JOINT_RUNGS if rung.name in ("ideal", "comp
 ROD_RUNGS = (
     Rung(
         name="rigid",
-        assumes="the rod keeps its shape",
+        assumes="rigid rod",
         nanoseconds_per_step=0.0,
     ),
     Rung(
         name="elastic",
-        assumes="the rod stretches and bends: one mode each, between and across its eyes",
+        assumes="one axial and one bending mode of the rod",
         reference="Shabana 2020, floating frame of reference with mean axes",
-        valid="up to its second modes; force along it up to a tenth of Euler's load",
+        valid="up to its second modes; axial force up to a tenth of Euler's load",
         needs="rod.section_area and rod.section_radius",
         nanoseconds_per_step=200.0,
     ),
 )
-"""Rungs of the rods, all alike."""
+"""Rungs of the rods."""
 
 PRESSURE_RUNGS = (
     Rung(
@@ -108,7 +108,7 @@ PRESSURE_RUNGS = (
     ),
     Rung(
         name="two-level",
-        assumes="suction and discharge pressure by turns",
+        assumes="suction and discharge pressure in turn",
         reference="quasi-static limit of the rung above",
         needs="pressure.suction and pressure.discharge",
         nanoseconds_per_step=20.0,
@@ -116,8 +116,8 @@ PRESSURE_RUNGS = (
     Rung(
         name="heads",
         assumes="incompressible liquid: energy balance of the lines, liquid inertia as added mass",
-        reference="Xia et al. 2017, eqs 16-27 with their misprints mended",
-        valid="while the liquid's pressure stays above that of its vapour, at every knock too",
+        reference="Xia et al. 2017, eqs 16-27 with misprints corrected",
+        valid="while the liquid stays above its vapour pressure, also at knocks",
         needs="both lines and valves",
         nanoseconds_per_step=30.0,
     ),
@@ -130,7 +130,7 @@ PRESSURE_RUNGS = (
     ),
     Rung(
         name="lumped-lines",
-        assumes="such chambers on two pipes of all throws, each a mass on a spring at the pump",
+        assumes="chambers on two shared pipes, each a mass on a spring at the pump",
         reference="first mode of an organ pipe closed at the pump",
         valid="up to the first organ-pipe frequency of a pipe; liquid column without vapour",
         needs="as chamber, and the wave speeds of both lines",
@@ -138,9 +138,9 @@ PRESSURE_RUNGS = (
     ),
     Rung(
         name="wave-lines",
-        assumes="such chambers on two pipes of all throws with waves, five reaches at the least",
+        assumes="chambers on two shared pipes with waves, at least five reaches",
         reference="method of characteristics: Wylie, Streeter 1993",
-        valid="plane waves, quasi-steady friction; vapour at the pipe's nodes alone",
+        valid="plane waves, quasi-steady friction; vapour only at the pipe's nodes",
         needs="as chamber, and the wave speeds of both lines",
         nanoseconds_per_step=900.0,
     ),
@@ -150,12 +150,12 @@ PRESSURE_RUNGS = (
 DRIVE_RUNGS = (
     Rung(
         name="constant-speed",
-        assumes="the crank turns evenly whatever it carries",
+        assumes="constant crank speed at any load",
         nanoseconds_per_step=0.0,
     ),
     Rung(
         name="motor",
-        assumes="asynchronous motor and flywheel: the speed gives way",
+        assumes="asynchronous motor and flywheel: the speed drops under load",
         reference="Kloss 1929",
         needs="drive.motor",
         nanoseconds_per_step=30.0,
@@ -166,20 +166,20 @@ DRIVE_RUNGS = (
 CASING_RUNGS = (
     Rung(
         name="driven",
-        assumes="the casing hears the mechanism and does not answer: its bearing is at rest",
-        valid="casing far heavier at the bearing than what moves",
+        assumes="forces drive the casing, which does not act back: bearing at rest",
+        valid="apparent mass of the casing at the bearing far above the moving masses",
         nanoseconds_per_step=0.0,
     ),
     Rung(
         name="yielding",
-        assumes="the bearing moves with the casing's modes, each at that cost, and the crank too",
+        assumes="the bearing moves with the casing's modes, and the crank with it; cost per mode",
         reference="Newton's equations in the frame of the bearing",
-        valid="modes that reach as high as the knocks do",
+        valid="modes up to the frequencies of the knocks",
         needs="casing.modes",
         nanoseconds_per_step=13.0,
     ),
 )
-"""Rungs of the casing; what they cost is of a step of one mode."""
+"""Rungs of the casing; their costs are per step and mode."""
 
 PUMP_LADDERS = {
     "joint": JOINT_RUNGS,
@@ -191,7 +191,7 @@ PUMP_LADDERS = {
 """Effect -> its rungs. A new rung is one row, its code in the kernel, and one test."""
 
 PUMP_STEP_LEVELS = (4.0, 2.0, 4 / 3, 1.0, 0.5, 0.25)
-"""Factors on a step that is written: steps are few to a sample, from two to four is a long way."""
+"""Factors on the scene's step: few steps make a sample, so that two to four is a large change."""
 
 
 def pump_effects(scene: Scene) -> Iterator[Effect]:
@@ -239,7 +239,7 @@ def _rod_effect(scene: Scene) -> Iterator[Effect]:
 
 
 def pin_rungs(part: RevoluteJoint) -> tuple[Rung, ...]:
-    """Rungs of a pin: those in oil only where the scene says which oil.
+    """Rungs of a pin: oiled ones only if the scene gives the oil.
 
     Examples
     --------
@@ -255,7 +255,7 @@ def _joint_rung(name: str, scene: Scene) -> str:
 
 
 def _throw_paths(scene: PumpScene, table: str, leaf: str) -> Iterator[str]:
-    """Path of a value in the scene's own table, and in that of every throw that has its own."""
+    """Paths of a value in the scene's table, and in each throw's own table if it has one."""
     yield f"{table}.{leaf}"
     for i, throw in enumerate(scene.throws):
         if getattr(throw, table) is not None:
@@ -264,13 +264,13 @@ def _throw_paths(scene: PumpScene, table: str, leaf: str) -> Iterator[str]:
 
 def _pressure_effect(scene: Scene) -> Iterator[Effect]:
     pump = cast(PumpScene, scene)
-    if pump.piston.diameter > 0:  # else there is nothing to push on
+    if pump.piston.diameter > 0:  # else there is no pressure force
         rungs = written(pressure_rungs(pump), _throw_paths(pump, "pressure", "rung"))
         yield effect("pressure", scene, rungs, lambda one: str(one.pressure.rung), beyond=_beyond)
 
 
 def pressure_rungs(pump: PumpScene) -> tuple[Rung, ...]:
-    """Rungs of the pressure: those with pipes only where the scene says how fast their waves are.
+    """Rungs of the pressure: those with pipes only if the scene gives their wave speeds.
 
     Examples
     --------
@@ -280,8 +280,8 @@ def pressure_rungs(pump: PumpScene) -> tuple[Rung, ...]:
     'chamber'
     """
     lines = (pump.pressure.suction_line, pump.pressure.discharge_line)
-    told = all(line is not None and line.wave_speed is not None for line in lines)
-    return tuple(rung for rung in PRESSURE_RUNGS if told or rung.name not in PIPED_RUNGS)
+    known = all(line is not None and line.wave_speed is not None for line in lines)
+    return tuple(rung for rung in PRESSURE_RUNGS if known or rung.name not in PIPED_RUNGS)
 
 
 def _drive_effect(scene: Scene) -> Iterator[Effect]:
@@ -297,7 +297,7 @@ def _casing_effect(scene: Scene) -> Iterator[Effect]:
 
 
 def _stiffest(scene: PumpScene) -> PumpScene:
-    """The scene with every spring that it can have: a step that is stable there is so anywhere."""
+    """The scene with all springs it can have: a step that is stable there is stable in any rung."""
     joints = (*_joint_effects(scene), *_bearing_effect(scene))
     stiff = [(part, "compliant") for part in joints]
     for part, name in [*stiff, *((rod, "elastic") for rod in _rod_effect(scene))]:
@@ -314,23 +314,23 @@ def _step_effect(scene: Scene) -> Iterator[Effect]:
 
 
 def sample_step(scene: Scene) -> float:
-    """Step that a pump runs with, a whole part of a sample [s]."""
-    told = pump_step(cast(PumpScene, scene))
-    return 1 / scene.sample_rate / math.ceil(1 / (scene.sample_rate * told) - _ROUNDING)
+    """Step of a pump's run, a whole fraction of a sample [s]."""
+    longest = pump_step(cast(PumpScene, scene))
+    return 1 / scene.sample_rate / math.ceil(1 / (scene.sample_rate * longest) - _ROUNDING)
 
 
-_ROUNDING = 1e-9  # of a number of steps that would be whole
+_ROUNDING = 1e-9  # tolerance for a whole number of steps
 
 
 # --- cost
 
-_MECHANISM = 60.0  # ns of a step of one throw beside its effects
+_MECHANISM = 60.0  # ns per step of one throw in addition to its effects
 
-_MODE = 12.0  # ns of a step of one casing mode and its sensors
+_MODE = 12.0  # ns per step of one casing mode and its sensors
 
-_REACH = 6.0  # ns of a step of one reach of a pipe with waves
+_REACH = 6.0  # ns per step of one reach of a pipe with waves
 
-_CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
+_CASING_FIXED = 200.0  # ns per step in addition: low-pass and bookkeeping
 
 
 def pump_cost(scene: Scene) -> float:
@@ -348,6 +348,6 @@ def pump_cost(scene: Scene) -> float:
 
 
 def _reaches(pump: PumpScene) -> int:
-    """Reaches of both pipes at the step of the run; without waves 0."""
+    """Number of reaches of both pipes at the step of the run; 0 without waves."""
     lines = lines_of(pump, sample_step(pump))
     return 0 if lines is None else int(lines.pipes["reaches"].sum())

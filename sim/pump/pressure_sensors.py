@@ -1,4 +1,4 @@
-"""What pressure transmitters at the cylinders of a pump read."""
+"""Readings of the pressure transmitters at a pump's cylinders."""
 
 import math
 
@@ -13,9 +13,9 @@ Float = NDArray[np.float64]
 
 
 def cylinder_pressure(scene: PumpScene, force: Float) -> Float:
-    """Gauge pressure on the face of a piston that the liquid pushes along x by `force` [Pa].
+    """Gauge pressure on a piston with the liquid's force `force` along x [Pa].
 
-    Every rung has it so, with the inertia of the columns that *heads* adds.
+    Valid for every rung, including the inertia of the columns that *heads* adds.
     """
     return np.asarray(-force / (math.pi / 4 * scene.piston.diameter**2))
 
@@ -23,18 +23,18 @@ def cylinder_pressure(scene: PumpScene, force: Float) -> Float:
 def read_pressures(
     scene: PumpScene, pressures: list[Float], kept: slice, rng: np.random.Generator
 ) -> tuple[list[NDArray[np.float32]], int]:
-    """Channels of the pressure sensors, and how many samples were clipped.
+    """Channels of the pressure sensors, and the number of clipped samples.
 
     Parameters
     ----------
     scene : PumpScene
     pressures : list of numpy.ndarray [shape=(n,)]
-        On the piston of every sensor's throw at all samples [Pa gauge], band-limited as the
-        accelerations are.
+        Pressure on the piston of every sensor's throw at all samples [Pa gauge], band-limited like
+        the accelerations.
     kept : slice
-        Samples that are recorded: lines and transmitters have settled before.
+        Recorded samples: lines and transmitters have settled before them.
     rng : numpy.random.Generator
-        Of the noise.
+        Source of the noise.
     """
     rows, clipped = [], 0
     for (_, sensor), pressure in zip(scene.pressure_sensors, pressures, strict=True):
@@ -47,7 +47,7 @@ def read_pressures(
 def pressures_at_rest(
     scene: PumpScene, n_samples: int, rng: np.random.Generator
 ) -> tuple[list[NDArray[np.float32]], int]:
-    """As :func:`read_pressures`, of a crank that stands: every cylinder is at suction pressure."""
+    """Like :func:`read_pressures`, with the crank at rest and all cylinders at suction pressure."""
     rows, clipped = [], 0
     for throw, sensor in scene.pressure_sensors:
         pressure = scene.pressures(throw)
@@ -62,22 +62,22 @@ def pressures_at_rest(
 def read_pressure(
     sensor: PressureSensor, pressure: Float, rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], int]:
-    """What a transmitter and its converter make of the pressure at the membrane.
+    """Reading of a transmitter and its converter for a pressure at the membrane.
 
     Parameters
     ----------
     sensor : PressureSensor
     pressure : ndarray, shape (n_samples,)
-        Gauge [Pa], band-limited.
+        Gauge pressure [Pa], band-limited.
     rng : numpy.random.Generator
-        Of the noise.
+        Source of the noise.
 
     Returns
     -------
     signal : ndarray, shape (n_samples,)
         float32 [Pa], between absolute vacuum and the upper end of the range.
     clipped : int
-        Samples above the range. Those at vacuum are none: there the liquid leaves the membrane.
+        Samples above the range. Vacuum does not clip: there the liquid leaves the membrane.
 
     Examples
     --------
@@ -102,7 +102,7 @@ def read_pressure(
 
 
 def _lagged(sensor: PressureSensor, pressure: Float, fs: float) -> Float:
-    """Whole run behind connecting line and transmitter."""
+    """The whole run after connecting line and transmitter."""
     poles: list[NDArray[np.complex128]] = []
     if sensor.line_resonance is not None and sensor.line_damping is not None:
         poles.append(mounting_poles(sensor.line_resonance, sensor.line_damping))

@@ -1,7 +1,7 @@
-"""What shakers and hammers do to the casing of a pump, running or at rest.
+"""Forces of shakers and hammers on the casing of a pump, running or at rest.
 
-Their forces are made at the rate of the steps and go the way of all others through the casing; the
-force cell reads them through the filter that the accelerations pass.
+They are generated at the rate of the steps and pass through the casing like all other forces; the
+force cell reads them through the same filter as the accelerations.
 """
 
 import numpy as np
@@ -21,18 +21,18 @@ def casing_pushes(
     ----------
     scene : PumpScene
     n_steps : int
-        Of the run.
+        Number of steps of the run.
     first, last : int
-        Steps between which it is recorded; a steady force is there before and after.
+        First and last recorded step; a steady force acts before and after as well.
     factor : int
         Steps per sample.
     seed : int
-        Of the recording.
+        Seed of the recording.
 
     Returns
     -------
     tuple of Push
-        Of `n_steps` samples each.
+        One force of `n_steps` samples per exciter.
     """
     return tuple(
         exciter_push(
@@ -50,12 +50,12 @@ def casing_pushes(
 
 
 def pushed_places(scene: PumpScene) -> tuple[str, ...]:
-    """Keys of the places of all mounted exciters, as the casing knows them."""
+    """Keys of the places of all mounted exciters in the casing."""
     return tuple(pushed_place(scene, part.place) for part in scene.mounted_exciters)
 
 
 def pushed_place(scene: PumpScene, place: str) -> str:
-    """Key under which the casing knows a place: a measured one counts throws."""
+    """Key of a place in the casing: in a measured one, places include the throw."""
     if scene.casing.frf is not None and place in FORCE_PLACES:
         return f"{place}_1"
     return place
@@ -68,7 +68,7 @@ def read_cells(
     kept: slice,
     rng: np.random.Generator,
 ) -> tuple[list[NDArray[np.float32]], int]:
-    """Channels of the force cells, and how many samples were clipped."""
+    """Channels of the force cells, and the number of clipped samples."""
     rows, clipped = [], 0
     for part, push in zip(scene.mounted_exciters, pushes, strict=True):
         force = decimate(push.cell[:, None], factor)[kept, 0]

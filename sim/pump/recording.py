@@ -1,4 +1,4 @@
-"""A reciprocating pump, from its scene to its recording."""
+"""Simulation of a reciprocating pump, from its scene to its recording."""
 
 from typing import cast
 
@@ -25,31 +25,31 @@ from ..scene.scene import Scene
 from .findings import (
     exciter_truth,
     film_warnings,
-    judged,
     largest_lift_left,
     motor_warnings,
     oiled_pins,
     run_numerics,
+    run_status,
     run_truth,
     run_warnings,
 )
-from .gathering import Gathering, driven_casing, heard_by_sensors, measured_casing
+from .gathering import Gathering, driven_casing, measured_casing, sensor_response
 from .pressure_sensors import pressures_at_rest, read_pressures
 from .push import pushed_places, read_cells
 from .run_plan import LimitError, RunPlan, planned, refuse, rest_faults, steps_per_sample
 from .scene_run import run_scene
 from .validity import FEWEST_STEPS
 
-_AT_ONCE = 9216  # steps that are gathered at once: they stay in the processor's cache
+_CHUNK = 9216  # steps processed together: they fit the processor's cache
 
 
 def check_pump(scene: Scene) -> None:
-    """Check what only the physics can tell: rungs, step, sampling, files.
+    """Check rungs, step, sampling and files, which need the physics.
 
     Raises
     ------
     SceneError
-        Every fault at once.
+        All faults together.
     """
     pump = cast(PumpScene, scene)
     if pump.running:
@@ -64,7 +64,7 @@ def simulate_pump(
 ) -> Recording:
     """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`.
 
-    Without its truth, that of :data:`GATHERED_TRUTH` may be had for next to nothing.
+    Without its truth, the part named in :data:`GATHERED_TRUTH` costs almost nothing.
     """
     pump = cast(PumpScene, scene)
     if not pump.running:
@@ -83,9 +83,9 @@ def simulate_pump(
         keep_states=truth,
     )
     gathered = Gathering(plan, seed, None, truth=gathered_truth)
-    for first in range(0, run.steps, _AT_ONCE):
-        steps = slice(first, first + _AT_ONCE)
-        ends = slice(first, first + _AT_ONCE + 1)
+    for first in range(0, run.steps, _CHUNK):
+        steps = slice(first, first + _CHUNK)
+        ends = slice(first, first + _CHUNK + 1)
         gathered.add(
             run.turns[ends],
             run.forces[steps].T,
@@ -97,7 +97,7 @@ def simulate_pump(
 
 
 def _film_gaps(scene: PumpScene, run: CrankRun, ends: slice) -> NDArray[np.float64] | None:
-    """Gap and force of peaks of all films of a run [shape=(n, n_films, 2)]; None without any."""
+    """Gap and asperity force of all films of a run [shape=(n, n_films, 2)]; None without films."""
     films = []
     if run.gaps is not None:
         gaps, oiled = run.gaps[ends], oiled_pins(scene)
@@ -108,7 +108,7 @@ def _film_gaps(scene: PumpScene, run: CrankRun, ends: slice) -> NDArray[np.float
 
 
 def refused_run(scene: PumpScene, error: "LimitError") -> Recording:
-    """Recording of a scene beyond the limits of its methods: its status and a signal of zeros."""
+    """Recording of a scene beyond the limits of its methods: status, and a signal of zeros."""
     return failed(scene, error.status, {})
 
 
@@ -119,14 +119,14 @@ def recording_of(
     truth: CrankRun | None = None,
     raise_on_failure: bool = False,
 ) -> Recording:
-    """Recording of a run of the mechanism, of which all steps were gathered.
+    """Recording of a run of the mechanism whose steps were all gathered.
 
     Parameters
     ----------
     gathered : Gathering
     run : CrankTally
     truth : CrankRun, optional
-        The run with its states, where the truth is asked for.
+        The run with its states, if the truth is requested.
     raise_on_failure : bool
 
     Raises
@@ -137,13 +137,13 @@ def recording_of(
     plan, pushes, seed = gathered.plan, gathered.pushes, gathered.seed
     pump = plan.scene
     lift = largest_lift_left(gathered)
-    status = judged(gathered, lift) if run.status.ok else run.status
+    status = run_status(gathered, lift) if run.status.ok else run.status
     numerics = run_numerics(gathered, run, lift)
     if not status.ok:
         if raise_on_failure:
             raise SimulationError(status, pump.name)
         return failed(pump, status, numerics)
-    acceleration, casing_numerics = heard_by_sensors(gathered.casing)
+    acceleration, casing_numerics = sensor_response(gathered.casing)
     pressures = gathered.pressures()
     signal, clipped = _measured(acceleration, gathered.turned(), plan, pushes, seed, pressures)
     numerics |= casing_numerics
@@ -163,13 +163,13 @@ def recording_of(
 
 
 def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Recording:
-    """A test of the casing while the crank stands: no force but those of the exciters."""
+    """Test of the casing with the crank at rest, under the exciters' forces only."""
     refuse(pump, rest_faults(pump))
     plan = RunPlan(pump, FEWEST_STEPS)
     pushes = plan.pushes(seed)
     casing = driven_casing(plan, pushed_places(pump))
     casing.add(np.array([push.along for push in pushes]).reshape(len(pushes), plan.n_steps))
-    acceleration, numerics = heard_by_sensors(casing)
+    acceleration, numerics = sensor_response(casing)
     angle = np.full(plan.n_samples, pump.drive.start_angle)
     signal, clipped = _measured(acceleration, angle, plan, pushes, seed, None)
     numerics |= {"step_s": plan.step, "steps": plan.n_steps, "mean_speed_hz": 0.0}
@@ -192,9 +192,9 @@ def _measured(
     seed: int,
     pressures: list[NDArray[np.float64]] | None,
 ) -> tuple[NDArray[np.float32], int]:
-    """Signal of every channel, and how many samples were clipped.
+    """Signal of every channel, and the number of clipped samples.
 
-    Pressures are those at the sensors of all samples; None where the crank stands.
+    `pressures` are those at the sensors, for all samples; None with the crank at rest.
     """
     scene = plan.scene
     rng = np.random.default_rng(seed)
@@ -216,10 +216,10 @@ def _measured(
     rows += cells
     clipped += lost
     if pressures is None:
-        told, lost = pressures_at_rest(scene, plan.n_samples, rng)
+        readings, lost = pressures_at_rest(scene, plan.n_samples, rng)
     else:
-        told, lost = read_pressures(scene, pressures, plan.kept, rng)
-    rows += told
+        readings, lost = read_pressures(scene, pressures, plan.kept, rng)
+    rows += readings
     clipped += lost
     if scene.tacho and not scene.running:
         rows.append(np.zeros(plan.n_samples, dtype=np.float32))
@@ -229,7 +229,7 @@ def _measured(
 
 
 def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> NDArray[np.float64]:
-    """Whole run through mounting and anti-alias filter: they have settled when it is recorded."""
+    """The whole run after mounting and anti-alias filter, which settle before the recording."""
     poles: list[NDArray[np.complex128]] = []
     if sensor.mounting_resonance is not None and sensor.mounting_damping is not None:
         poles.append(mounting_poles(sensor.mounting_resonance, sensor.mounting_damping))

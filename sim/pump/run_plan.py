@@ -1,4 +1,4 @@
-"""How long a pump is run and in which steps, or why it is refused."""
+"""Length and steps of a pump's run, or why it is refused."""
 
 import math
 
@@ -15,34 +15,34 @@ from ..scene.scene import SceneError
 from .push import casing_pushes
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 
-_BYTES_PER_STEP = 3 * 10 * 8  # of one throw: forces and chamber as doubles, two passes over them
+_BYTES_PER_STEP = 3 * 10 * 8  # for one throw: forces and chamber as doubles, two passes over them
 
 
 def planned(scene: PumpScene) -> "RunPlan":
-    """Steps and samples of a running scene.
+    """Plan steps and samples of a running scene.
 
     Raises
     ------
     SceneError, LimitError
-        As :func:`steps_per_sample`.
+        As in :func:`steps_per_sample`.
     """
     return RunPlan(scene, steps_per_sample(scene))
 
 
 def rest_faults(scene: PumpScene) -> list[str]:
-    """What keeps a pump at rest from being recorded: memory, exciters."""
+    """Faults of a recording with the pump at rest: memory, exciters."""
     needed = scene.duration * scene.sample_rate * FEWEST_STEPS * _BYTES_PER_STEP
     return [*memory_faults(scene, needed), *pushing_faults(scene, scene.exciters)]
 
 
 def refuse(scene: PumpScene, faults: list[str]) -> None:
-    """Raise what is wrong, where anything is."""
+    """Raise the faults, if there are any."""
     if faults:
         raise SceneError(scene.name, faults)
 
 
 class RunPlan:
-    """Which steps of a scene are run, and which samples are kept."""
+    """Steps of a scene's run, and the samples that are kept."""
 
     def __init__(self, scene: PumpScene, factor: int) -> None:
         rate, speed = scene.sample_rate, scene.drive.speed
@@ -54,7 +54,7 @@ class RunPlan:
         self.n_samples = round(scene.duration * rate)
         self.n_steps = (settling + self.n_samples + edge) * factor
         self.kept = slice(settling, settling + self.n_samples)
-        # a sample stands for the middle of its first step, see decimate
+        # a sample represents the middle of its first step, see decimate
         before = (settling * factor + 0.5) / (rate * factor)
         self.first_angle = scene.drive.start_angle - 2 * math.pi * speed * before
 
@@ -72,19 +72,19 @@ class RunPlan:
 
     @property
     def angle(self) -> NDArray[np.float64]:
-        """Crank angle at the samples [rad], at constant speed; made anew, as many plans wait."""
+        """Crank angle at the samples [rad], at constant speed; not stored, to save memory."""
         scene = self.scene
         seconds = np.arange(self.n_samples) / scene.sample_rate
         return np.asarray(scene.drive.start_angle + 2 * math.pi * scene.drive.speed * seconds)
 
     def turned(self, made: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
+        """Crank angle at the samples [rad]: exact at constant speed, else as computed."""
         return made if self.scene.drive.rung != "constant-speed" else self.angle
 
     def at_samples(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the samples from those at the ends of all steps, first axis time.
+        """Values at the samples from those at the ends of all steps, with time as first axis.
 
-        A sample stands for the middle of a step: its value is the mean of the step's two ends.
+        A sample represents the middle of a step: its value is the mean of the step's two ends.
         """
         first, step = self.kept.start * self.factor, self.factor
         last = first + self.n_samples * step
@@ -92,7 +92,7 @@ class RunPlan:
 
 
 class LimitError(SceneError):
-    """A scene beyond the limits of its methods; the status says which."""
+    """A scene beyond the limits of its methods; the status gives the reason."""
 
     def __init__(self, name: str, faults: list[str], status: Status) -> None:
         self.status = status
@@ -100,18 +100,18 @@ class LimitError(SceneError):
 
 
 def steps_per_sample(scene: PumpScene) -> int:
-    """Integration steps per sample: what the contact needs, or what the scene asks for.
+    """Integration steps per sample: as the contact needs, or as set in the scene.
 
     Raises
     ------
     SceneError
-        All of: an invalid rung, a recording shorter than a revolution or two samples, a pulse
-        shorter than two samples. Or: a step of less than a thousandth of a sample, a run that
+        Collected faults: an invalid rung, a recording shorter than a revolution or two samples, a
+        pulse shorter than two samples. Or: a step shorter than a thousandth of a sample, a run that
         needs more than 4 GB.
     LimitError
         A step too long for the contact, a contact too soft for its law or its clearance, a
-        pressure below that of the vapour, in a trial of two revolutions too; with the status a
-        sweep records.
+        pressure below that of the vapour, also in a trial of two revolutions; its status goes into
+        the recording.
     """
     faults = joint_faults(scene)
     if faults:
@@ -134,7 +134,7 @@ def steps_per_sample(scene: PumpScene) -> int:
 
 
 def _step_fault(scene: PumpScene, steps: float) -> str | None:
-    if steps - 1e-9 <= MOST_STEPS:  # the bound itself, whatever its rounding
+    if steps - 1e-9 <= MOST_STEPS:  # the bound itself, allowing for rounding
         return None
     shortest = 1 / (scene.sample_rate * MOST_STEPS)
     if scene.numerics.step is not None:
@@ -150,7 +150,7 @@ def _step_fault(scene: PumpScene, steps: float) -> str | None:
 
 
 def _size_fault(scene: PumpScene, steps: float) -> str | None:
-    """Refuse what would not fit the memory, before any of it is taken."""
+    """Refuse a run that would exceed the memory, before any is allocated."""
     time = scene.duration + scene.settling_revolutions / scene.drive.speed
     per_step = _BYTES_PER_STEP * len(scene.throws)
     needed = time * scene.sample_rate * max(steps, FEWEST_STEPS) * per_step

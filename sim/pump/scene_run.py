@@ -1,4 +1,4 @@
-"""A run of a pump's mechanism: step by step, or in closed form where that says all."""
+"""Run of a pump's mechanism: step by step, or in closed form if that is exact."""
 
 import math
 
@@ -12,37 +12,37 @@ from ..pump_setup.films import start_films
 from ..pump_setup.ideal_motion import forces_on_piston, ideal_motion
 from ..pump_setup.joints import gravity_along_and_across, has_main_play, joint_rungs
 from ..pump_setup.rods import rod_table
-from ..pump_setup.tables import begun, lines_of
+from ..pump_setup.tables import lines_of, tables_and_start
 from ..pump_setup.yielding import yielding_of
 from ..scene.pump import PumpScene
-from ..scene.pump_hydraulics import BREATHING_RUNGS
+from ..scene.pump_hydraulics import CHAMBER_RUNGS
 
 
 def needs_integration(scene: PumpScene) -> bool:
-    """False where the closed form says all: ideal joints, pressure by angle, all else driven."""
+    """Whether a run needs steps: not with ideal joints, pressure by angle and no other dynamics."""
     ideal = all(
         rung == JOINT_IDEAL
         for throw in range(len(scene.throws))
         for rung in joint_rungs(scene, throw)
     )
-    breathing = any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
+    chambered = any(scene.pressures(k).rung in CHAMBER_RUNGS for k in range(len(scene.throws)))
     answered = scene.drive.rung != "constant-speed" or scene.casing.rung == "yielding"
     moving = has_main_play(scene) or scene.rod.rung == "elastic"
-    return not ideal or breathing or answered or moving
+    return not ideal or chambered or answered or moving
 
 
 def run_scene(
     scene: PumpScene, *, step: float, n_steps: int, start_angle: float, keep_states: bool = False
 ) -> CrankRun:
-    """Run the mechanism of a scene: in closed form where that says all, else step by step.
+    """Run the mechanism of a scene, in closed form if that is exact, else step by step.
 
     Parameters
     ----------
     scene : PumpScene
     step : float
-        [s], at most ``LARGEST_STEP_PER_CONTACT_TIME`` over :func:`contact_rate`.
+        Step [s], at most ``LARGEST_STEP_PER_CONTACT_TIME`` over :func:`contact_rate`.
     n_steps : int
-        Steps to take.
+        Number of steps to take.
     start_angle : float
         Crank angle at the start [rad].
     keep_states : bool
@@ -51,11 +51,11 @@ def run_scene(
     Returns
     -------
     CrankRun
-        Cut off at the step in which it failed where the status is not OK.
+        Truncated at the step that failed if the status is not OK.
     """
     if not needs_integration(scene):
         return _run_ideal(scene, step=step, n_steps=n_steps, start_angle=start_angle)
-    t, start = begun(scene, step, start_angle)
+    t, start = tables_and_start(scene, step, start_angle)
     return run_mechanism(
         t,
         angle=start.angle,
@@ -73,7 +73,7 @@ def run_scene(
 
 
 def _run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: float) -> CrankRun:
-    """The closed form as a run: forces at the middle of each step."""
+    """The closed form as a run, with forces at the middle of each step."""
     speed = 2 * math.pi * scene.drive.speed
     angle = start_angle + speed * step * np.arange(n_steps + 1.0)
     middle = 0.5 * (angle[:-1] + angle[1:])
@@ -143,27 +143,27 @@ def pin_offsets(
     journal: NDArray[np.float64] | None = None,
     flex: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Position of the pins' centres from those of their eyes [m].
+    """Position of the pins' centres relative to those of their eyes [m].
 
     Parameters
     ----------
     scene : PumpScene
     angle : numpy.ndarray [shape=(n,)]
-        Of the crank [rad].
+        Crank angle [rad].
     bodies : numpy.ndarray [shape=(n, 12)]
-        Of the throw, columns as ``BODY``, then their rates.
+        State of the throw: columns as ``BODY``, then their rates.
     throw : int
-        Counted from 0.
+        Throw, counted from 0.
     journal : numpy.ndarray [shape=(n, 4)], optional
-        Of a crank with play in its main bearings, as of :class:`.CrankRun`.
+        Journal of a crank with play in its main bearings, as in :class:`.CrankRun`.
     flex : numpy.ndarray [shape=(n, 4)], optional
-        Of the throw's elastic rod, as of :class:`.CrankRun`.
+        Modes of the throw's elastic rod, as in :class:`.CrankRun`.
 
     Returns
     -------
     numpy.ndarray [shape=(n, 4)]
-        Crank pin x (along the stroke) and y (across it), wrist pin x and y. The length exceeds
-        the radial clearance by the penetration where there is contact.
+        Crank pin x (along the stroke) and y (across it), wrist pin x and y. In contact the distance
+        exceeds the radial clearance by the penetration.
     """
     x, y, beta, piston, across = bodies[:, :5].T
     angle = angle + scene.throws[throw].phase
@@ -188,7 +188,7 @@ def _eyes_moved(
     sin_b: NDArray[np.float64],
     cos_b: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """By which stretch and bow of the rod move its eyes, columns as of :func:`pin_offsets` [m]."""
+    """Displacement of the eyes by the rod's modes, columns as in :func:`pin_offsets` [m]."""
     modes, centre = rod_table(scene)[0], scene.rod.centre_of_mass / scene.rod.length
     stretch, bow = flex[:, STRETCH], flex[:, BOW]
     moved = []

@@ -1,7 +1,7 @@
-"""Where the liquid column of a pump tears: the rung heads has no vapour, its columns no give.
+"""Check for a torn liquid column: the rung heads has no vapour and rigid columns.
 
-A knock brakes the piston within a millisecond. The column that the rung *heads* moves with the
-piston as a rigid mass then pulls on it, down to pressures that no liquid bears.
+A knock decelerates the piston within a millisecond. The column, which the rung *heads* moves with
+the piston as a rigid mass, then pulls on it, down to pressures that no liquid sustains.
 """
 
 import math
@@ -16,11 +16,11 @@ from ..scene.pump import PumpScene
 from .scene_run import run_scene
 
 _TRIAL_TURNS = 2.0
-"""Revolutions of a trial after settling: what knocks, knocks in each of them."""
+"""Revolutions of a trial after settling: a joint that knocks does so in each of them."""
 
 
 class Tear(NamedTuple):
-    """A throw whose liquid would tear: its number from 0, lowest and vapour pressure [Pa gauge]."""
+    """A throw with a torn column: its number from 0, lowest and vapour pressure [Pa gauge]."""
 
     throw: int
     lowest: float
@@ -29,18 +29,18 @@ class Tear(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The fault, with its cure."""
+        """Fault text, with its cure."""
         cause = "the knocks pull the liquid down to" if self.knocks else "the piston needs"
-        flow = ", or pressure.flow = 'two-harmonic', which feels no knocks" * self.knocks
+        flow = ", or pressure.flow = 'two-harmonic', which ignores knocks" * self.knocks
         return (
-            f"pressure: {cause} {self.lowest:.4g} Pa at its lowest, must be >= the liquid's vapour "
+            f"pressure: {cause} {self.lowest:.4g} Pa at the lowest, must be >= the liquid's vapour "
             f"pressure = {self.vapour:.4g} Pa gauge; set pressure.rung = 'chamber'{flow}, shorten "
             "pressure.suction_line.length, or lower the speed"
         )
 
 
 def torn_in_motion(scene: PumpScene) -> list[Tear]:
-    """Throws whose column tears already by the motion of a crank without clearance.
+    """Throws whose column tears in the motion of a crank without clearance.
 
     Examples
     --------
@@ -58,14 +58,14 @@ def torn_in_motion(scene: PumpScene) -> list[Tear]:
 
 
 def torn_by_knocks(scene: PumpScene, step: float) -> list[Tear]:
-    """Throws whose column tears in a trial: two revolutions after settling, knocks included.
+    """Throws whose column tears in a trial of two revolutions after settling, with knocks.
 
     Parameters
     ----------
     scene : PumpScene
-        Without other faults.
+        A scene without other faults.
     step : float
-        [s]
+        Integration step [s].
 
     Examples
     --------
@@ -96,7 +96,7 @@ def torn_by_pull(scene: PumpScene, pull: NDArray[np.float64]) -> list[Tear]:
     ----------
     scene : PumpScene
     pull : numpy.ndarray [shape=(n_throws,)]
-        As of :func:`lowest_under_pull`.
+        As in :func:`lowest_under_pull`.
     """
     found = []
     for throw in _columns(scene):
@@ -110,7 +110,7 @@ def torn_by_pull(scene: PumpScene, pull: NDArray[np.float64]) -> list[Tear]:
 def lowest_under_pull(
     scene: PumpScene, pull: NDArray[np.float64], throws: list[int] | None = None
 ) -> float:
-    """Lowest pressure on the piston faces of a run, the inertia of the liquid included.
+    """Lowest pressure on the pistons in a run, including the inertia of the liquid.
 
     Parameters
     ----------
@@ -118,12 +118,12 @@ def lowest_under_pull(
     pull : numpy.ndarray [shape=(n_throws,)]
         Largest force of the liquid along x on each piston [N], after settling.
     throws : list of int, optional
-        Those that count, from 0; all by default.
+        Throws to include, counted from 0; all by default.
 
     Returns
     -------
     float
-        Gauge [Pa], a mean over its step; infinite where no liquid pushes, or no step counts.
+        Gauge pressure [Pa], a mean over its step; infinite without liquid or without steps.
     """
     area = piston_area(scene)
     each = range(len(scene.throws)) if throws is None else throws

@@ -1,4 +1,4 @@
-"""What a pump's rungs and steps must hold: clearances, penetrations, tears, lengths of steps."""
+"""Validity checks of a pump's rungs and steps: clearances, penetrations, torn columns, steps."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -22,21 +22,21 @@ from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .tearing import torn_by_knocks, torn_in_motion
 
 STEP_PER_CONTACT_TIME = 0.3
-"""Default step times the contact's fastest angular frequency: 21 steps a contact period."""
+"""Default step times the contact's fastest angular frequency: 21 steps per contact period."""
 
 STEP_PER_STARVED_CONTACT_TIME = 0.15
-"""The same where a pin flies into a thin film, which no event locates."""
+"""The same for a pin flying into a thin film, which is no event that cuts the step."""
 
 STEP_PER_CONTACT_DECAY = 0.7
-"""Default step times the contact's fastest decay, where damping is beyond critical."""
+"""Default step times the contact's fastest decay, if its damping is above critical."""
 
 LARGEST_STEP_PER_CONTACT_TIME = 1.0
-"""A step longer than this over the contact's rate is refused: Runge-Kutta 4 stays stable to 2.8
-but is no longer accurate."""
+"""Largest step over the contact's time constant: Runge-Kutta 4 is stable up to 2.8
+but no longer accurate."""
 
 
 def joint_faults(scene: PumpScene) -> list[str]:
-    """Joints that need a clearance and have none, guides against their bearing; with cures."""
+    """Joints that lack a needed clearance, and guides moving against their bearing."""
     tight = [
         f"{path}.rung = '{part.rung}' needs a clearance > 0 m; "
         f"set {path}.rung = 'ideal' for a joint without one"
@@ -47,22 +47,22 @@ def joint_faults(scene: PumpScene) -> list[str]:
 
 
 def _opposed(scene: PumpScene) -> list[str]:
-    """A guide that moves against a bearing which takes it along: the one would feed the other."""
+    """Find a guide that moves against a bearing which carries it: one would excite the other."""
     gain = 0.0 if scene.casing.rung != "yielding" else guide_gain(scene)
     if gain >= _MOST_OPPOSED:
         return []
     return [
-        f"casing.modes: guide_y moves against bearing_y by {gain:.3g} of it under what is guided, "
-        f"must be >= {_MOST_OPPOSED:g} where casing.rung = 'yielding', whose guide moves as the "
-        "bearing does; check the signs of the shapes, or set casing.rung = 'driven'"
+        f"casing.modes: guide_y moves against bearing_y by {gain:.3g} of it under the guided mass, "
+        f"must be >= {_MOST_OPPOSED:g} with casing.rung = 'yielding', whose guide moves with the "
+        "bearing; check the signs of the shapes, or set casing.rung = 'driven'"
     ]
 
 
-_MOST_OPPOSED = -0.25  # a bilge pump ran with -0.24, and away with -0.48
+_MOST_OPPOSED = -0.25  # a bilge pump was stable with -0.24 and unstable with -0.48
 
 
 def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide]]:
-    """Throw, path and part of every joint that is given, those of the scene's own tables once."""
+    """Throw, path and part of every joint given, those of the scene's own tables once."""
     for throw, own in enumerate(scene.throws):
         if throw > 0 and own.joint is None and scene.throws[0].joint is None:
             continue
@@ -79,25 +79,25 @@ _BEARING = "crank.bearing"
 
 
 _UNRESOLVED = 4.0
-"""Static penetration under the ideal joint's largest force, over the radial clearance: beyond it
-the joint is a spring in which a gap of this size makes no difference."""
+"""Largest static penetration under the ideal joint's largest force, over the radial clearance:
+above it, the clearance has no effect on the joint."""
 
 
 def limits(scene: PumpScene) -> list[tuple[Status, str]]:
-    """What of a scene is beyond the validity of its rungs: status, and a fault with its cure.
+    """Violations of the validity of a scene's rungs: status, and fault with cure.
 
     Parameters
     ----------
     scene : PumpScene
-        Without faults otherwise.
+        A scene without other faults.
 
     Returns
     -------
     list of (Status, str)
-        Empty where every rung is valid.
+        Empty if every rung is valid.
     """
     checks: tuple[Callable[[PumpScene], list[tuple[Status, str]]], ...] = (
-        _sunk,
+        _penetrations,
         _slender,
         _torn,
         _too_long,
@@ -107,7 +107,7 @@ def limits(scene: PumpScene) -> list[tuple[Status, str]]:
 
 
 def knock_limits(scene: PumpScene) -> list[tuple[Status, str]]:
-    """What only a trial shows of a scene that :func:`limits` lets pass, in the same form.
+    """Violations that only a trial run shows, after :func:`limits`, in the same form.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def knock_limits(scene: PumpScene) -> list[tuple[Status, str]]:
     Returns
     -------
     list of (Status, str)
-        Also empty where the step is refused for its length, which ends any trial.
+        Also empty if the step is too long, which prevents a trial.
     """
     steps = math.ceil(1 / (scene.sample_rate * pump_step(scene)) - 1e-9)
     if steps > MOST_STEPS:
@@ -125,8 +125,8 @@ def knock_limits(scene: PumpScene) -> list[tuple[Status, str]]:
     return [(Status.VAPOUR, tear.text) for tear in torn_by_knocks(scene, step)]
 
 
-def _sunk(scene: PumpScene) -> list[tuple[Status, str]]:
-    """Contacts too soft for their load: beyond their law, or blind to their own clearance."""
+def _penetrations(scene: PumpScene) -> list[tuple[Status, str]]:
+    """Contacts too soft for their load: beyond their law, or unable to resolve their clearance."""
     found = []
     for throw, path, part in _joints(scene):
         if JOINT_CODES[part.rung] < JOINT_COMPLIANT:
@@ -171,11 +171,11 @@ def _unresolved(
     return [(Status.UNRESOLVED, text)]
 
 
-_MOST_OF_EULER = 0.1  # softens a rod's bending to 0.95 of its frequency, which is left out
+_MOST_OF_EULER = 0.1  # reduces a rod's bending frequency to 0.95, which is neglected
 
 
 def _slender(scene: PumpScene) -> list[tuple[Status, str]]:
-    """Elastic rods whose load would soften or buckle them: their bending knows of none."""
+    """Elastic rods whose load would soften or buckle them, which their bending mode neglects."""
     most = _MOST_OF_EULER * buckling_load(scene)
     load = max(max(joint_loads(scene, throw)[:2]) for throw in range(len(scene.throws)))
     if load <= most:
@@ -189,7 +189,7 @@ def _slender(scene: PumpScene) -> list[tuple[Status, str]]:
 
 
 def _size(part: RevoluteJoint | Guide) -> tuple[float, str]:
-    """Length that an overlap is measured against [m], and what it is."""
+    """Reference length of an overlap [m], and its name."""
     if isinstance(part, Guide):
         return part.height / 2, "half the height"
     return part.pin_diameter / 2, "the pin's radius"
@@ -201,37 +201,37 @@ def _torn(scene: PumpScene) -> list[tuple[Status, str]]:
 
 
 def _too_long(scene: PumpScene) -> list[tuple[Status, str]]:
-    """A step that is written, and longer than the contact can be followed with."""
-    told, rate = scene.numerics.step, contact_rate(scene)
-    if told is None or told * rate <= LARGEST_STEP_PER_CONTACT_TIME:
+    """A step set in the scene that is too long for the contact."""
+    step, rate = scene.numerics.step, contact_rate(scene)
+    if step is None or step * rate <= LARGEST_STEP_PER_CONTACT_TIME:
         return []
     longest = LARGEST_STEP_PER_CONTACT_TIME / rate
     text = (
-        f"numerics.step = {told:g} s must be <= {longest:.3g} s, the contact's rate being "
+        f"numerics.step = {step:g} s must be <= {longest:.3g} s, as the contact's rate is "
         f"{1 / longest:.4g} 1/s; shorten it, or lower joint.crankpin.stiffness and damping"
     )
     return [(Status.STEP, text)]
 
 
 def _too_short(scene: PumpScene) -> list[tuple[Status, str]]:
-    """Pipes with waves that a step, which is written, crosses too soon (Courant)."""
-    told = scene.numerics.step
+    """Pipes with waves that are too short for the scene's step (Courant)."""
+    step = scene.numerics.step
     return [
         (
             Status.STEP,
-            f"numerics.step = {told:g} s must be <= {longest:.3g} s, in which a wave passes a "
+            f"numerics.step = {step:g} s must be <= {longest:.3g} s, in which a wave passes a "
             f"{FEWEST_REACHES}th of {path}; shorten it, or set pressure.rung = 'lumped-lines'",
         )
         for path, longest in wave_steps(scene)
-        if told is not None and told > longest * (1 + _ROUNDING)
+        if step is not None and step > longest * (1 + _ROUNDING)
     ]
 
 
-_ROUNDING = 1e-9  # of a step that is a whole part of a pipe's time of travel
+_ROUNDING = 1e-9  # tolerance for a step that divides a pipe's travel time
 
 
 def wave_steps(scene: PumpScene) -> list[tuple[str, float]]:
-    """Pipes that carry waves, each with the longest step it can be resolved with [s].
+    """Pipes that carry waves, each with its longest admissible step [s].
 
     Examples
     --------
@@ -253,14 +253,14 @@ def wave_steps(scene: PumpScene) -> list[tuple[str, float]]:
 
 
 FEWEST_STEPS = 2
-"""A sample of a pump: the casing runs once a step, and needs twice the sample rate."""
+"""Fewest steps per sample: the casing runs once per step, and needs twice the sample rate."""
 
 MOST_STEPS = 1000
-"""Steps per sample: beyond it a step says more about a slip than about accuracy."""
+"""Most steps per sample: a smaller step is more likely a mistake than a need of accuracy."""
 
 
 def pump_step(scene: PumpScene) -> float:
-    """Longest step of a pump: what is written, else what contact, casing and waves need [s].
+    """Longest step of a pump: that of the scene, else as contact, casing and waves need [s].
 
     Examples
     --------
@@ -280,7 +280,7 @@ def pump_step(scene: PumpScene) -> float:
 
 
 def _starved(scene: PumpScene) -> bool:
-    """Whether any pin runs in oil that fills thin gaps only."""
+    """Whether any pin has oil that fills thin gaps only."""
     return any(
         part.rung in OILED_RUNGS and part.oil is not None and part.oil.filled_gap is not None
         for _, _, part in _joints(scene)
@@ -289,7 +289,7 @@ def _starved(scene: PumpScene) -> bool:
 
 
 def pump_steps(scene: PumpScene) -> int:
-    """Steps of a pump's run, settling included, but for the filters' edges."""
+    """Number of steps of a pump's run, including settling but not the filters' edges."""
     time = scene.duration + scene.settling_revolutions / scene.drive.speed
     return math.ceil(time * scene.sample_rate) * math.ceil(
         1 / (scene.sample_rate * pump_step(scene)) - 1e-9

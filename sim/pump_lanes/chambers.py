@@ -1,4 +1,4 @@
-"""Chambers with valves of all lanes: steps side by side, and alone where that will not do."""
+"""Chambers with valves of all lanes: vectorised steps, and single ones where those fail."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from ..hydraulics.liquid import air_volume
 from ..hydraulics.valves import ValveSide, valve_shares
 from ..jit import kernel, subroutine
 from ..mechanism.layout import WITH_VAPOUR
-from ..mechanism.march import breathe
+from ..mechanism.march import step_chamber
 from .fields import fields_of, put_fields
 from .lane_layout import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane
 
@@ -35,7 +35,7 @@ def _valves_of(p: Any, lane: int) -> Any:
 
 @kernel
 def enter_chamber(lane: int, p: Any, s: Any, a: Any) -> None:
-    """Begin the chamber of a throw in its lane."""
+    """Start the chamber of a throw in its lane."""
     for side in range(2):
         shares = valve_shares(implicit_part(p.step[lane]), _side_of(p, side, lane))
         put_fields(p.share[side], lane, shares)
@@ -85,13 +85,13 @@ def _side_by_side(p: Any, s: Any) -> None:
 
 
 @subroutine
-def breathe_alone(lane: int, p: Any, s: Any, a: Any) -> None:
-    """Step the chamber of one lane, however hard that is."""
+def step_chamber_alone(lane: int, p: Any, s: Any, a: Any) -> None:
+    """Step the chamber of one lane by the general method."""
     chamber, one = a.chambers[lane], a.work.held[0]
     for c in range(CHAMBER_COLUMNS):
         chamber[c] = s.chamber0[c, lane]
     h, substeps = p.step[lane], a.throws[lane].substeps
-    fault, before, after = breathe(
+    fault, before, after = step_chamber(
         chamber, one, a.liquid[lane], h, s.x[PISTON_X, lane], s.v[PISTON_X, lane], substeps
     )
     for c in range(CHAMBER_COLUMNS):
@@ -102,8 +102,8 @@ def breathe_alone(lane: int, p: Any, s: Any, a: Any) -> None:
 
 
 @subroutine
-def lanes_breathe(p: Any, s: Any, a: Any, code: Any) -> int:
-    """Step all chambers along their pistons' paths; how many of them alone."""
+def step_chambers(p: Any, s: Any, a: Any, code: Any) -> int:
+    """Step all chambers along their pistons' paths; return how many needed the general method."""
     _air(p, s)
     _side_by_side(p, s)
     alone = 0
@@ -111,13 +111,13 @@ def lanes_breathe(p: Any, s: Any, a: Any, code: Any) -> int:
         if code[lane] != 0:
             s.sure[lane] = 1.0
         elif s.sure[lane] == 0.0 or a.throws[lane].substeps > 1:
-            breathe_alone(lane, p, s, a)
+            step_chamber_alone(lane, p, s, a)
             alone += 1
     return alone
 
 
 @kernel
 def count_vapour(s: Any, a: Any) -> None:
-    """Count the lanes whose chamber holds vapour: they have breathed alone."""
+    """Count the lanes whose chamber holds vapour, all stepped by the general method."""
     for lane in range(LANES):
         a.counts[lane, WITH_VAPOUR] += s.sure[lane] == 0.0 and s.chamber[1, lane] > 0.0

@@ -1,7 +1,7 @@
-"""Tuples whose fields lie in a column of rows of lanes: read and written at once, in kernels.
+"""Tuples whose fields lie in one column of a table of lanes: read and written at once, in kernels.
 
-Each is the row of subscripts that it stands for. A slice or a loop over the rows would give the
-same numbers, at half the speed: the compiler does not see through them before it lays out vectors.
+Each is equivalent to one subscript per row. A slice or a loop over the rows would give the same
+numbers at half the speed: the compiler does not resolve them before it vectorises.
 """
 
 import operator

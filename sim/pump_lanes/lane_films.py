@@ -1,4 +1,4 @@
-"""Oil films of all lanes: their pull, what squeezes them, their load on rod and crank."""
+"""Oil films of all lanes: forces on the film, its velocity, its load on rod and crank."""
 
 import math
 from typing import Any
@@ -52,11 +52,11 @@ def _look_into_films(p: Any, s: Any) -> None:
             s.turned[2, lane],
             s.turned[3, lane],
         )
-        put_fields(s.apart, lane, (d_x, d_y, v_x, v_y))
+        put_fields(s.offset, lane, (d_x, d_y, v_x, v_y))
         s.overlap[0, lane] = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
         s.gap[lane] = film_gap(s.film[0, lane], s.film[1, lane], c)
         s.rough[0, lane] = s.rough[1, lane] = 0.0
-    for lane in range(LANES):  # peaks seldom touch, and take a power of the library
+    for lane in range(LANES):  # asperities seldom touch, and need a power function of the library
         o = oil_of(p, lane)
         if o.roughness > 0.0 and not s.gap[lane] >= SEPARATION * o.roughness:
             s.rough[0, lane], s.rough[1, lane] = peaks_of(s.gap[lane], o)
@@ -69,10 +69,10 @@ def _pull_films(p: Any, s: Any) -> None:
         found = film_pull(
             s.film[0, lane],
             s.film[1, lane],
-            s.apart[0, lane],
-            s.apart[1, lane],
-            s.apart[2, lane],
-            s.apart[3, lane],
+            s.offset[0, lane],
+            s.offset[1, lane],
+            s.offset[2, lane],
+            s.offset[3, lane],
             mean,
             s.rough[0, lane],
             s.rough[1, lane],
@@ -87,7 +87,7 @@ def _pull_films(p: Any, s: Any) -> None:
 def _squeeze(
     s: Any, lane: int, r_xx: float, r_xy: float, r_yx: float, r_yy: float, damped: float
 ) -> None:
-    """Take one of Newton's steps, but where it has settled, or is no number any more."""
+    """Take a Newton step, unless converged or no longer finite."""
     v_x, v_y = s.squeeze[0, lane], s.squeeze[1, lane]
     new_x, new_y, enough = newton_step(
         r_xx, r_xy, r_yx, r_yy, _film_pull_of(s, lane), v_x, v_y, damped
@@ -107,7 +107,7 @@ def _squeeze_short(p: Any, s: Any, damped: float) -> None:
 
 @subroutine
 def _squeeze_mapped(p: Any, s: Any, maps: Any, damped: float) -> None:
-    """The map is looked up lane by lane: no vector can tell it from what is written."""
+    """Take a Newton step with the map, lane by lane: aliasing prevents vectorisation."""
     for lane in range(LANES):
         f, o = _film_pull_of(s, lane), oil_of(p, lane)
         found = map_place(o, o.roots, o.angles, f.x, f.y, s.squeeze[0, lane], s.squeeze[1, lane])
@@ -142,8 +142,8 @@ def _load_films(p: Any, s: Any) -> None:
         x, y, on_pin, on_eye, rate_x, rate_y, _, peaks = film_load(
             s.film[0, lane],
             s.film[1, lane],
-            s.apart[0, lane],
-            s.apart[1, lane],
+            s.offset[0, lane],
+            s.offset[1, lane],
             mean,
             slip,
             s.squeeze[0, lane],
@@ -162,7 +162,7 @@ def _load_films(p: Any, s: Any) -> None:
 
 @subroutine
 def at_oiled_crankpin(p: Any, s: Any, maps: Any, mapped: bool) -> None:
-    """Films are sought together, until the last has found its velocity."""
+    """Solve for the films of all lanes together, until the last has converged."""
     _look_into_films(p, s)
     _pull_films(p, s)
     for step in range(NEWTON_STEPS):

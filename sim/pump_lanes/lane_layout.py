@@ -1,4 +1,4 @@
-"""Numbers and states of lanes side by side: what the kernels of lanes are told and remember."""
+"""Tables and states of the lanes, as the kernels use them."""
 
 from typing import Any, NamedTuple
 
@@ -13,33 +13,33 @@ from ..mechanism.throw_motion import Pose
 from .fields import fields_of
 
 DRY, SHORT_FILM, MAPPED_FILM = range(3)
-"""What is in the eyes of the crank pins."""
+"""Models of the crank pins' eyes."""
 
 LANES = 16
-"""Records side by side; the compiler does not lay fewer into vectors."""
+"""Number of lanes; the compiler does not vectorise fewer."""
 
 MOVING, ALL_MOVING = 5, 7
-"""Rows of a motion, see :data:`PLACES`: those that move in an ideal guide, and all."""
+"""Rows of a motion, see :data:`PLACES`: without those of an ideal guide, and all."""
 
 ROD_X, ROD_Y, BETA, PISTON_X, CRANK, PISTON_Y, TILT = range(ALL_MOVING)
-"""Rows of positions, velocities and accelerations; those come last that an ideal guide holds."""
+"""Rows of positions, velocities and accelerations; those held by an ideal guide come last."""
 
 PLACES = (ROD_X, ROD_Y, BETA, PISTON_X, PISTON_Y, TILT)
 """Rows of the coordinates of ``BODY``."""
 
 LANE_FORCES = ("pin_x", "pin_y", "guide_y", "piston_x", "seal_x", "guide_x")
-"""Rows of the forces: of ``FORCES`` those that the casing feels, but for the valves'."""
+"""Rows of the forces: those of ``FORCES`` on the casing, except the valves'."""
 
 PIN_X_FORCE, PIN_Y_FORCE, GUIDE_Y_FORCE, FACE_FORCE, SEAL_FORCE, GUIDE_X_FORCE = range(
     len(LANE_FORCES)
 )
 
 CHAMBER_COLUMNS = 8
-"""Of a chamber: ``CHAMBER_STATE``, then position and velocity of its piston."""
+"""Columns of a chamber: ``CHAMBER_STATE``, then position and velocity of its piston."""
 
 
 class ThrowLane(NamedTuple):
-    """Numbers of a throw in a lane, as in ``THROW``."""
+    """Parameters of a throw in a lane, as in ``THROW``."""
 
     phase: float
     crank_radius: float
@@ -60,12 +60,12 @@ class ThrowLane(NamedTuple):
     guide_half_length: float
     guide_half_height: float
     inverse_piston_along: float  # [1/kg]
-    tight_wrist: float  # 1 where an ideal wrist pin holds rod and piston together, else 0
-    tight_guide: float  # 1 where an ideal guide holds the piston up, else 0
+    tight_wrist: float  # 1 if an ideal wrist pin joins rod and piston, else 0
+    tight_guide: float  # 1 if an ideal guide supports the piston, else 0
 
 
 class ContactLane(NamedTuple):
-    """Numbers of a contact in a lane, as in ``CONTACT``."""
+    """Parameters of a contact in a lane, as in ``CONTACT``."""
 
     law: float
     elasticity: float
@@ -84,7 +84,7 @@ class ContactLane(NamedTuple):
 
 
 class LiquidLane(NamedTuple):
-    """Numbers of a pressure in a lane, as in ``HYDRAULIC``."""
+    """Parameters of a pressure in a lane, as in ``HYDRAULIC``."""
 
     rung: float
     suction: float
@@ -96,7 +96,7 @@ class LiquidLane(NamedTuple):
 
 
 class ChamberLane(NamedTuple):
-    """Numbers of a chamber in a lane, as in ``HYDRAULIC``; its valves are ``ValveSide``."""
+    """Parameters of a chamber in a lane, as in ``HYDRAULIC``; its valves are ``ValveSide``."""
 
     suction: float
     discharge: float
@@ -111,7 +111,7 @@ class ChamberLane(NamedTuple):
 
 
 class OilLane(NamedTuple):
-    """Numbers of the oil of a crank pin in a lane, as in ``OIL``."""
+    """Parameters of the oil of a crank pin in a lane, as in ``OIL``."""
 
     short: float
     map: float
@@ -135,33 +135,34 @@ class OilLane(NamedTuple):
 NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
     stiffness=1.0, clearance=1e9, speed_floor=1.0, friction_speed=1.0
 )
-"""Contact of a tight joint: one with so much room never touches, and asks for no change."""
+"""Clearance of an ideal joint: so large that it never touches or changes."""
 
 MOST_MODES = 16
-"""Of a casing that yields in lanes; one with more runs alone."""
+"""Most modes of a casing that yields in lanes; one with more runs alone."""
 
 PUSH, REACT, REACH, GIVE, HELD, MOVED, _MODE_ROWS = np.cumsum(
     [0, len(PUSHES), 3, 3, 2, 2, 5]
 ).tolist()
-"""First rows of a mode's numbers, as ``Yielding``; of its place, speed and last three forces."""
+"""First rows of a mode's parameters, as in ``Yielding``, and of its position, speed and last three
+forces."""
 
 CASING = np.dtype([("modes", "f8", (MOST_MODES, _MODE_ROWS, LANES))])
-"""Modes of the casings of all lanes, numbers and state of each in one block: the compiler lays a
-loop over lanes into vectors only where it knows how far what it reads is from what it writes."""
+"""Modes of the casings of all lanes, parameters and state of each in one block: the compiler
+vectorises a loop over lanes only if it knows the distance of what it reads from what it writes."""
 
 PLAIN_LAWS = tuple(
     ContactLane._fields.index(name) for name in ("law", "elasticity", "friction_law")
 )
-"""Columns of a contact that are 0 where its laws are the plain ones: spring and dashpot, smooth
-friction. A loop that knows needs one root and one division where the others need three and four."""
+"""Columns of a contact that are 0 for the plain laws: spring and dashpot, smooth
+friction. A loop for these needs one root and one division instead of three and four."""
 
 PLAN = np.dtype(
     [
         ("throw", "f8", (len(ThrowLane._fields), LANES)),
         ("contact", "f8", (3, len(ContactLane._fields), LANES)),
-        ("throws", "i8"),  # of every record: they lie in lanes beside each other, in their order
-        ("driven", "f8"),  # 1 where any lane's crank has a motor; of all others it turns evenly
-        ("plain", "f8", 3),  # 1 where no lane's contact in a joint has other laws than the plain
+        ("throws", "i8"),  # of every record: they lie in adjacent lanes, in their order
+        ("driven", "f8"),  # 1 if any lane's crank has a motor; else all speeds are constant
+        ("plain", "f8", 3),  # 1 if all lanes' contacts in a joint have the plain laws
         ("machine", "f8", (len(Machine._fields), LANES)),
         ("liquid", "f8", (len(LiquidLane._fields), LANES)),
         ("chamber", "f8", (len(ChamberLane._fields), LANES)),
@@ -170,24 +171,24 @@ PLAN = np.dtype(
         ("share", "f8", (2, 3, LANES)),  # see valve_shares
         ("step", "f8", LANES),
         ("sixth", "f8", LANES),  # of the step
-        ("weight", "f8", LANES),  # of a step's force in its mean, as the march of one weighs it
-        ("modes", "i8"),  # of the casing that has most of them
+        ("weight", "f8", LANES),  # of a step's force in its mean, as in the march of one record
+        ("modes", "i8"),  # of the casing with the most modes
         ("gravity", "f8", (2, LANES)),  # of a bearing at rest
         ("blend", "f8", (2, 2, LANES)),  # as ``Yielding``
     ]
 )
-"""Numbers of all lanes, codes as numbers too; columns as the fields of the tuples above."""
+"""Parameters of all lanes, codes as floats too; columns as the fields of the tuples above."""
 
 STATE = np.dtype(
     [
-        ("x0", "f8", (ALL_MOVING, LANES)),  # where the step began
+        ("x0", "f8", (ALL_MOVING, LANES)),  # at the start of the step
         ("v0", "f8", (ALL_MOVING, LANES)),
         ("a0", "f8", (ALL_MOVING, LANES)),
         ("force0", "f8", (len(LANE_FORCES), LANES)),
         ("margin0", "f8", (CONTACTS, LANES)),
         ("approach0", "f8", (CONTACTS, LANES)),
         ("normal0", "f8", LANES),
-        ("x", "f8", (ALL_MOVING, LANES)),  # the stage that was looked at last
+        ("x", "f8", (ALL_MOVING, LANES)),  # at the current stage
         ("v", "f8", (ALL_MOVING, LANES)),
         ("a", "f8", (ALL_MOVING, LANES)),
         ("force", "f8", (len(LANE_FORCES), LANES)),
@@ -200,61 +201,61 @@ STATE = np.dtype(
         ("pressed", "f8", LANES),  # pressure on the piston
         ("pin", "f8", (4, LANES)),  # ``PinLoad`` of the crank pin
         ("wrist", "f8", (4, LANES)),  # and of a wrist pin with play
-        ("moment", "f8", LANES),  # of all throws on the crank, in the lane of each
+        ("moment", "f8", LANES),  # of all throws on the crank, in each throw's lane
         ("lead", "f8", (2, LANES)),  # sine and cosine of the crank at the first throw
         ("guide", "f8", (3, LANES)),  # force of a guide with play (x, y), and its moment
-        ("middle_v", "f8", (ALL_MOVING, LANES)),  # of the stages in the middle, added
+        ("middle_v", "f8", (ALL_MOVING, LANES)),  # sum over the middle stages
         ("middle_a", "f8", (ALL_MOVING, LANES)),
         ("middle_force", "f8", (len(LANE_FORCES), LANES)),
         ("high", "f8", LANES),  # largest normal force of the step
         ("peak", "f8", LANES),  # of all steps
         ("touching", "f8", (CONTACTS, LANES)),  # 0 or 1
         ("impact", "f8", (CONTACTS, LANES)),
-        ("pressure0", "f8", (2, LANES)),  # on the piston at both ends of the step, of a chamber
-        ("pressure", "f8", (2, LANES)),  # the same, of the step that is being looked at
-        ("chamber0", "f8", (CHAMBER_COLUMNS, LANES)),  # where the step began
+        ("pressure0", "f8", (2, LANES)),  # on the piston at both ends of a chamber's step
+        ("pressure", "f8", (2, LANES)),  # the same, for the current step
+        ("chamber0", "f8", (CHAMBER_COLUMNS, LANES)),  # at the start of the step
         ("chamber", "f8", (CHAMBER_COLUMNS, LANES)),
-        ("air", "f8", LANES),  # of the chamber where the step began
+        ("air", "f8", LANES),  # of the chamber at the start of the step
         ("flow", "f8", (2, LANES)),  # impulses of the valves
-        ("sure", "f8", LANES),  # 1 where the chambers' step side by side is good
-        ("choked", "f8", LANES),  # 1 where a chamber has failed
-        ("film0", "f8", (2, LANES)),  # where the film lets the pin be, where the step began
+        ("sure", "f8", LANES),  # 1 if the vectorised step of the chambers is valid
+        ("choked", "f8", LANES),  # 1 if a chamber has failed
+        ("film0", "f8", (2, LANES)),  # film position of the pin at the start of the step
         ("film_rate0", "f8", (2, LANES)),
         ("film", "f8", (2, LANES)),
         ("film_rate", "f8", (2, LANES)),
-        ("middle_film", "f8", (2, LANES)),  # rates of the stages in the middle, added
-        ("squeeze0", "f8", (2, LANES)),  # velocity of the film, where the next search begins
+        ("middle_film", "f8", (2, LANES)),  # rates, sum over the middle stages
+        ("squeeze0", "f8", (2, LANES)),  # velocity of the film, start of the next search
         ("squeeze", "f8", (2, LANES)),
-        ("apart", "f8", (4, LANES)),  # see crank_offset
+        ("offset", "f8", (4, LANES)),  # see crank_offset
         ("rough", "f8", (2, LANES)),  # see peaks_of
         ("pull", "f8", (len(FilmPull._fields), LANES)),
         ("place", "f8", (len(MapPlace._fields), LANES)),
         ("patch", "f8", (4, LANES)),  # see map_patches
-        ("settled", "f8", LANES),  # 1 where the film's velocity is found
+        ("settled", "f8", LANES),  # 1 if the film's velocity has converged
         ("gap", "f8", LANES),  # least film
-        ("carried", "f8", LANES),  # by touching peaks
-        ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
+        ("carried", "f8", LANES),  # by asperities
+        ("asks", "f8", LANES),  # 1 if a contact needs a change within this step
         ("bad", "f8", LANES),  # status code of this step
         ("pushed", "f8", LANES),  # force of a throw on a mode of the casing
-        ("bearing", "f8", (2, LANES)),  # its acceleration with the casing, zero between steps
-        ("felt", "f8", (2, LANES)),  # of it, by what turns
-        ("felt_before", "f8", (2, 2, LANES)),  # one and two steps before
-        ("late", "f8", (2, LANES)),  # by how much what was felt was ahead of it
+        ("bearing", "f8", (2, LANES)),  # its acceleration, zero between steps
+        ("assumed", "f8", (2, LANES)),  # acceleration of the bearing in the mechanism's step
+        ("assumed_before", "f8", (2, 2, LANES)),  # one and two steps before
+        ("late", "f8", (2, LANES)),  # assumed minus actual acceleration
     ]
 )
-"""All lanes in the middle of their step. One record: the compiler lays a loop into vectors where it
+"""All lanes in the middle of their step. One record: the compiler vectorises a loop if it
 sees that what it writes is not what it reads."""
 
 
 @kernel
 def throw_of(p: Any, lane: int) -> Any:
-    """Numbers of the throw of a lane."""
+    """Parameters of the throw of a lane."""
     return fields_of(ThrowLane, p.throw, lane)
 
 
 @kernel
 def contact_of(p: Any, j: int, lane: int) -> Any:
-    """Numbers of one contact of a lane."""
+    """Parameters of one contact of a lane."""
     return fields_of(ContactLane, p.contact[j], lane)
 
 
@@ -280,5 +281,5 @@ def lane_pose(s: Any, lane: int) -> Any:
 
 @kernel
 def oil_of(p: Any, lane: int) -> Any:
-    """Numbers of the oil in the crank pin of a lane."""
+    """Parameters of the oil in the crank pin of a lane."""
     return fields_of(OilLane, p.oil, lane)

@@ -1,17 +1,17 @@
-"""The crank mechanism of many records side by side, compiled.
+"""Crank mechanisms of many records in parallel, compiled.
 
-Records that differ only in their numbers take the same steps through the same arithmetic: laid side
-by side, a lane each, the compiler does four at a time and hides what one waits for. The equations
-are those of :mod:`.throw_motion`, so are the bytes: a lane's result does not depend on its place,
-its neighbours or how many there are, and equals that of the record alone.
+Records that differ only in their parameters need the same arithmetic. Placed side by side, one per
+lane, the compiler computes four at a time and overlaps their waiting times. The equations are those
+of :mod:`.throw_motion`, and the bytes too: a lane's result does not depend on its position,
+its neighbours or their number, and equals that of the record alone.
 
-A step in which a contact of a lane changes is taken again for that lane by the march of one record,
+A step in which a contact of a lane changes is repeated for that lane by the march of one record,
 which cuts it; so is that of a chamber whose pressure or valves are not found at once. A failed lane
-is left behind.
+stops.
 
 Lanes are for throws whose crank pin has clearance, dry or oiled, whose wrist pin and guide are
-ideal or have clearance, under a pressure that follows from the crank angle, or a chamber. Each has
-a lane; those of a record lie beside each other, and each turns a copy of the crank.
+ideal or have clearance, with a pressure by crank angle, or a chamber. Each throw has
+a lane; those of a record are adjacent, and each has a copy of the crank.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -77,24 +77,24 @@ Float = NDArray[np.float64]
 
 
 class LaneKind(NamedTuple):
-    """What lanes that run together have beside play in their crank pins."""
+    """Properties of lanes that run together, in addition to play in their crank pins."""
 
     wrist: bool  # play in wrist pins
     guide: bool  # play in guides
-    breathing: bool  # chambers with valves
-    throws: int  # of each, in lanes beside each other
-    oil: int  # what is in the eyes of their crank pins, see ``MAPPED_FILM``
+    chambers: bool  # chambers with valves
+    throws: int  # per record, in adjacent lanes
+    oil: int  # models of the crank pins' eyes, see ``MAPPED_FILM``
     yields: bool  # casings that carry their bearings along
 
     @property
-    def beside(self) -> int:
-        """Records that lanes hold."""
+    def records(self) -> int:
+        """Number of records that the lanes hold."""
         return LANES // self.throws
 
 
 @dataclass(frozen=True, kw_only=True)
 class LaneJob:
-    """One run of the mechanism, as ``run_mechanism`` is told it."""
+    """One run of the mechanism, with the arguments of ``run_mechanism``."""
 
     tables: Tables
     start: Start
@@ -105,7 +105,7 @@ class LaneJob:
 
 
 def lane_kind(scene: PumpScene) -> LaneKind | None:
-    """What the lane of a scene must have; None of a mechanism that lanes do not know."""
+    """Kind of lane of a scene; None for a mechanism that lanes do not support."""
     throws = range(len(scene.throws))
     crankpins, wristpins, guides = zip(*(joint_rungs(scene, k) for k in throws), strict=True)
     rungs = {scene.pressures(k).rung for k in throws}
@@ -116,11 +116,11 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
         and set(crankpins) in ({JOINT_COMPLIANT}, {JOINT_OILED})
         and {JOINT_IDEAL, JOINT_COMPLIANT}.issuperset(wristpins)
         and rungs.isdisjoint(("heads", *PIPED_RUNGS))
-        and (len(rungs) == 1 or "chamber" not in rungs)  # all breathe or none
+        and (len(rungs) == 1 or "chamber" not in rungs)  # all have chambers or none
     )
     oils = {_oil_of(joint_parts(scene, k)[0]) for k in throws}
     yields = scene.casing.rung == "yielding"
-    # a film's search would begin from another place than alone
+    # a film's search would start from another point than alone
     if yields and (oils != {DRY} or len(scene.casing.modes) > MOST_MODES):
         return None
     if not known or len(oils) > 1:
@@ -128,7 +128,7 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
     return LaneKind(
         wrist=JOINT_COMPLIANT in wristpins,
         guide=JOINT_COMPLIANT in guides,
-        breathing="chamber" in rungs,
+        chambers="chamber" in rungs,
         throws=len(throws),
         oil=oils.pop(),
         yields=yields,
@@ -141,14 +141,14 @@ def _oil_of(crankpin: Any) -> int:
     return MAPPED_FILM if runs_on_a_map(crankpin) else SHORT_FILM
 
 
-_ROOM = 8192  # steps of a lane that are handed on together
+_ROOM = 8192  # steps of a lane that are passed on together
 
 
 class Steps(Protocol):
-    """What is told of the steps of a run, and may not keep what it is given."""
+    """Receiver of the steps of a run; it must not keep the arrays it gets."""
 
     def add(self, turns: Float, forces: Float, chambers: Float | None, gaps: Float | None) -> None:
-        """As :meth:`.Gathering.add`, with forces of :func:`lane_columns`."""
+        """Like :meth:`.Gathering.add`, with forces of :func:`lane_columns`."""
 
 
 _INVERSE_INERTIA = Machine._fields.index("inverse_inertia")
@@ -156,14 +156,14 @@ _VALVES = ("suction_valve", "discharge_valve")
 
 
 def _kept_rows(kind: LaneKind) -> tuple[int, ...]:
-    """Rows of a stretch's forces that are kept of lanes of a kind: on the casing and the piston."""
-    always = len(LANE_FORCES) - 1  # friction in the guide is the last
+    """Rows of forces kept for lanes of a kind: those on the casing and the piston."""
+    always = len(LANE_FORCES) - 1  # the last is friction in the guide
     friction = (always,) * kind.guide
-    return (*range(always), *friction, *(always + 1, always + 2) * kind.breathing)
+    return (*range(always), *friction, *(always + 1, always + 2) * kind.chambers)
 
 
 def lane_columns(kind: LaneKind) -> tuple[int, ...]:
-    """Of all forces of a run: those that lanes of a kind keep, by throw."""
+    """Columns of a run's forces that lanes of a kind keep, by throw."""
     names = (*LANE_FORCES, *_VALVES)
     return tuple(
         1 + len(FORCES) * throw + FORCES.index(names[row])
@@ -175,54 +175,54 @@ def lane_columns(kind: LaneKind) -> tuple[int, ...]:
 def run_lanes(
     jobs: Sequence[LaneJob], kind: LaneKind, steps: Callable[[int], Steps]
 ) -> Iterator[tuple[int, CrankTally]]:
-    """Run mechanisms of one kind side by side.
+    """Run mechanisms of one kind in parallel.
 
     Parameters
     ----------
     jobs : sequence of LaneJob
-        Taken as lanes become free.
+        Started as lanes become free.
     kind : LaneKind
-        All that any of them has; what one of them lacks costs it time only. Either all of them
-        breathe or none, and all have as many throws.
+        Properties that any of them has; unused ones only cost time. Either all
+        have chambers or none, and all have the same number of throws.
     steps : callable
-        Called with the number of a job that begins: who is told of its steps.
+        Called with the number of a job that starts; returns the receiver of its steps.
 
     Yields
     ------
     number : int
-        Of the job; in the order in which runs end.
+        Number of the job, in the order in which runs end.
     run : CrankTally
-        All its steps have been handed on.
+        Counts of the run, after all its steps were passed on.
     """
     if not jobs:
         return
-    longest = sorted(range(len(jobs)), key=lambda n: -jobs[n].n_steps)  # the last lanes end alike
+    longest = sorted(range(len(jobs)), key=lambda n: -jobs[n].n_steps)  # to end together
     ahead, lanes = iter(longest), _Lanes(kind, jobs, steps)
     while lanes.fill(ahead):
-        lanes.go_on()
+        lanes.advance()
         yield from lanes.ended()
 
 
 class _Lanes:
-    """All lanes, what their runs are at, and their last steps that were not handed on yet.
+    """All lanes, the progress of their runs, and steps not yet passed on.
 
-    A run has a lane for each of its throws and is known by that of the first.
+    A run has a lane for each of its throws; the first lane identifies it.
     """
 
     def __init__(
         self, kind: LaneKind, jobs: Sequence[LaneJob], steps: Callable[[int], Steps]
     ) -> None:
-        self._kind, self._breathing, self._throws = kind, kind.breathing, kind.throws
+        self._kind, self._chambered, self._throws = kind, kind.chambers, kind.throws
         self._oiled = kind.oil != DRY
-        self._firsts = range(0, LANES - kind.throws + 1, kind.throws)  # lane of every run
+        self._firsts = range(0, LANES - kind.throws + 1, kind.throws)  # first lane of every run
         self._jobs, self._steps = jobs, steps
-        self._told: dict[int, Steps] = {}  # by lane
+        self._receivers: dict[int, Steps] = {}  # by lane
         self._plan = np.zeros(1, PLAN)
         self._plan["throws"] = kind.throws
         self._state = np.zeros(1, STATE)
         self._casing = np.zeros(1, CASING)
-        self._number = np.full(LANES, -1)  # of the job in each lane
-        self._at = np.zeros(LANES, np.int64)  # steps taken of it and not handed on
+        self._number = np.full(LANES, -1)  # job in each lane
+        self._at = np.zeros(LANES, np.int64)  # its steps taken and not yet passed on
         self._left = np.zeros(LANES, np.int64)
         self._offsets, maps = _maps_of(jobs)
         self._alone = alone(jobs[0].tables, maps)
@@ -235,12 +235,12 @@ class _Lanes:
         self._past = _Past(
             turns=np.empty((LANES, 2, _ROOM + 1)),
             forces=np.empty((LANES, len(self._columns), _ROOM)),
-            chambers=np.empty((LANES, len(GATHERED), _ROOM + 1 if self._breathing else 1)),
+            chambers=np.empty((LANES, len(GATHERED), _ROOM + 1 if self._chambered else 1)),
             gaps=np.zeros((LANES, 2, _ROOM + 1 if self._oiled else 1)),
         )
 
     def fill(self, ahead: Iterator[int]) -> bool:
-        """Put the next jobs into free lanes; False where all is done."""
+        """Put the next jobs into free lanes; return False when all are done."""
         for lane in self._firsts:
             if self._number[lane] >= 0:
                 continue
@@ -251,7 +251,7 @@ class _Lanes:
         return bool(np.any(self._number >= 0))
 
     def _enter(self, first: int, number: int) -> None:
-        """Begin a run in lanes from the first on."""
+        """Start a run in lanes from the first on."""
         job, plan, own = self._jobs[number], self._plan[0], slice(first, first + self._throws)
         for throw in range(self._throws):
             self._lay(first + throw, job, throw)
@@ -260,10 +260,10 @@ class _Lanes:
         enter_lane(first, plan, self._state[0], self._alone, self._kind.oil != DRY)
         self._kept.code[own], self._number[own] = 0, number
         self._at[own], self._left[own] = 0, job.n_steps
-        self._told[first] = self._steps(number)
+        self._receivers[first] = self._steps(number)
 
     def _lay(self, lane: int, job: LaneJob, throw: int) -> None:
-        """Write a throw and where it begins into its lane."""
+        """Write a throw and its initial state into its lane."""
         t, a, start = job.tables, self._alone, job.start
         state, plan = self._state[0], self._plan[0]
         q, liquid = t.throws[throw], t.liquid[throw]
@@ -311,9 +311,9 @@ class _Lanes:
         modes[:n, GIVE:HELD], modes[:n, HELD:MOVED] = casing.give, casing.held
         plan["blend"][..., lane] = casing.blend
 
-    def go_on(self) -> None:
-        """March until the first run ends, or a lane has no room left."""
-        march_on(
+    def advance(self) -> None:
+        """March until the first run ends, or a lane's buffer is full."""
+        march_lanes(
             self._kind,
             self._plan[0],
             self._state[0],
@@ -325,28 +325,28 @@ class _Lanes:
             self._left,
             self._past,
         )
-        if np.any(self._at == _ROOM):  # all at once, or one lane after the other would have none
+        if np.any(self._at == _ROOM):  # all together, or one lane after the other would be full
             for first in self._firsts:
                 if self._at[first]:
-                    self._hand_on(first)
+                    self._pass_on(first)
 
-    def _hand_on(self, first: int) -> None:
+    def _pass_on(self, first: int) -> None:
         n, past, own = int(self._at[first]), self._past, slice(first, first + self._throws)
-        chambers = past.chambers[own, :, : n + 1].transpose(2, 0, 1) if self._breathing else None
+        chambers = past.chambers[own, :, : n + 1].transpose(2, 0, 1) if self._chambered else None
         columns = past.forces.shape[1]
         rows = slice(columns * own.start, columns * own.stop)
-        forces = past.forces.reshape(-1, _ROOM)[rows, :n]  # of one throw after the other
+        forces = past.forces.reshape(-1, _ROOM)[rows, :n]  # throw by throw
         gaps = past.gaps[own, :, : n + 1].transpose(2, 0, 1) if self._oiled else None
-        self._told[first].add(past.turns[first, :, : n + 1].T, forces, chambers, gaps)
+        self._receivers[first].add(past.turns[first, :, : n + 1].T, forces, chambers, gaps)
         past.turns[own, :, 0] = past.turns[own, :, n]
-        if self._breathing:
+        if self._chambered:
             past.chambers[own, :, 0] = past.chambers[own, :, n]
         if self._oiled:
             past.gaps[own, :, 0] = past.gaps[own, :, n]
         self._at[own] = 0
 
     def ended(self) -> Iterator[tuple[int, CrankTally]]:
-        """Runs at their end, taken out of their lanes."""
+        """Remove completed runs from their lanes."""
         over = (self._number >= 0) & ((self._left == 0) | (self._kept.code != 0))
         if not over.any():
             return
@@ -354,7 +354,7 @@ class _Lanes:
             if not over[first]:
                 continue
             if self._at[first]:
-                self._hand_on(first)
+                self._pass_on(first)
             yield int(self._number[first]), self._tally(first)
             own = slice(first, first + self._throws)
             self._number[own], self._kept.code[own] = -1, 1
@@ -377,16 +377,16 @@ class _Lanes:
 
 
 class _Past(NamedTuple):
-    """What the runs in the lanes have left behind since it was handed on."""
+    """Buffered steps of the lanes that were not yet passed on."""
 
     turns: Float  # (LANES, 2, _ROOM + 1)
     forces: Float  # (LANES, n_kept, _ROOM)
-    chambers: Float  # (LANES, len(GATHERED), _ROOM + 1); of one step where nothing breathes
-    gaps: Float  # (LANES, 2, _ROOM + 1) of the films, and what peaks carry; of one step without
+    chambers: Float  # one step without chambers
+    gaps: Float  # of the films, and force of asperities; one step without films
 
 
 @subroutine
-def march_on(
+def march_lanes(
     kind: Any,
     p: Any,
     s: Any,
@@ -398,9 +398,9 @@ def march_on(
     left: Any,
     past: Any,
 ) -> None:
-    """March all lanes until a run ends or fails, or a lane has no room left for its past.
+    """March all lanes until a run ends or fails, or a lane's buffer is full.
 
-    Compiled as a whole: handing these tables over costs as much as a hundred steps.
+    Compiled as a whole: passing these tables from Python costs as much as a hundred steps.
     """
     while True:
         n = STRETCH
@@ -424,7 +424,7 @@ def march_on(
 
 @subroutine
 def _take(k: Any, columns: Any, at: Any, past: Any, kind: Any) -> None:
-    """Add the last steps of every lane to its past; a column's block fits the innermost cache."""
+    """Append every lane's last steps to its buffer; a column's block fits the innermost cache."""
     left, n = k.left[0], 0
     for lane in range(LANES):
         n = max(n, k.done[lane])
@@ -432,7 +432,7 @@ def _take(k: Any, columns: Any, at: Any, past: Any, kind: Any) -> None:
         _lay_out(left.forces, columns[j], n, at, 0, past.forces, j)
     for c in range(2):
         _lay_out(left.turns, c, n, at, 1, past.turns, c)
-    if kind.breathing:
+    if kind.chambers:
         for c in range(len(GATHERED)):
             _lay_out(left.chambers, c, n, at, 1, past.chambers, c)
     if kind.oil != DRY:
@@ -444,11 +444,11 @@ def _take(k: Any, columns: Any, at: Any, past: Any, kind: Any) -> None:
 def _lay_out(steps: Any, column: int, n: int, at: Any, begin: int, rows: Any, row: int) -> None:
     """Write a column of n steps into a row of every lane.
 
-    Four lanes at once: what is read together for one is there for its neighbours. A lane that took
-    fewer steps, as it failed or is empty, gets more than it took, which nobody reads.
+    Four lanes at once: data read together for one serve its neighbours. A lane with fewer
+    steps, because it failed or is empty, gets excess values that are never read.
     """
     for lane in range(0, LANES, 4):
-        a, b = np.uint64(at[lane] + begin), np.uint64(at[lane + 1] + begin)  # none from the end
+        a, b = np.uint64(at[lane] + begin), np.uint64(at[lane + 1] + begin)  # not negative
         c, d = np.uint64(at[lane + 2] + begin), np.uint64(at[lane + 3] + begin)
         for i in range(np.uint64(n)):
             rows[lane, row, a + i] = steps[column, i, lane]
@@ -458,7 +458,7 @@ def _lay_out(steps: Any, column: int, n: int, at: Any, begin: int, rows: Any, ro
 
 
 def _maps_of(jobs: Sequence[LaneJob]) -> tuple[dict[bytes, int], Float]:
-    """Maps of all films, each once, one after the other; where those of tables begin."""
+    """Maps of all films, each once, concatenated; and the offset of each table's maps."""
     offsets: dict[bytes, int] = {}
     found, size = [], 0
     for job in jobs:

@@ -1,6 +1,6 @@
-"""Recordings of many pumps at once: those that can, side by side in lanes, the others alone.
+"""Recordings of many pumps: in parallel lanes where possible, the others one by one.
 
-A recording has the same bytes either way, so only time decides.
+A recording has the same bytes either way; only the time differs.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -12,14 +12,14 @@ from ..pump.recording import recording_of, refused_run, simulate_pump
 from ..pump.run_plan import LimitError, RunPlan, planned
 from ..pump.scene_run import needs_integration
 from ..pump_setup.films import start_films
-from ..pump_setup.tables import begun
+from ..pump_setup.tables import tables_and_start
 from ..pump_setup.yielding import yielding_of
 from ..scene.pump import PumpScene
 from ..scene.scene import Scene, SceneError
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
 
 _FEWEST = 5
-"""Lanes that are taken: with fewer, records are as fast one after the other."""
+"""Fewest records for which lanes are used; below, one after the other is as fast."""
 
 
 class _Job(NamedTuple):
@@ -29,7 +29,7 @@ class _Job(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """Which truth a recording is to have."""
+    """Truth requested for a recording."""
 
     whole: bool
     gathered: bool  # that of GATHERED_TRUTH
@@ -45,15 +45,15 @@ def simulate_pumps(
     jobs : sequence of (Scene, int)
         Scene and seed of each.
     truth : collection of str
-        Names of the truth that is asked for. Whatever is not of :data:`GATHERED_TRUTH` is known
-        of a record alone.
+        Names of the requested truth. What is not in :data:`GATHERED_TRUTH` needs a record to run
+        alone.
 
     Yields
     ------
     number : int
-        Of the job; every job comes once, in any order.
+        Number of the job; every job is returned once, in any order.
     recording : Recording or SceneError
-        As of :func:`.recording.simulate_pump` with `raise_on_failure` false; why a scene is
+        As from :func:`.recording.simulate_pump` with `raise_on_failure` false; or why a scene is
         refused.
     """
     kinds: dict[LaneKind, list[_Job]] = {}
@@ -79,15 +79,15 @@ def simulate_pumps(
 
 
 def pumps_alike(scene: Scene) -> tuple[LaneKind, int] | None:
-    """What records have in common that are best side by side; None of a scene that runs alone.
+    """Properties that records best run together share; None for a scene that runs alone.
 
-    Lanes of a kind, and as many steps a sample: a lane that ends before the others is empty.
+    These are the kind of lane and the steps per sample: a lane that ends early stays empty.
     """
     pump = cast(PumpScene, scene)
     kind = _kind_of(pump)
     try:
         return None if kind is None else (kind, planned(pump).factor)
-    except SceneError:  # whoever simulates it says why
+    except SceneError:  # reported when it is simulated
         return None
 
 
@@ -97,17 +97,17 @@ def _kind_of(scene: Scene) -> LaneKind | None:
 
 
 def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job]]]:
-    """Groups of a kind; those that would leave lanes empty together, with all that any has."""
-    large = [(kind, group) for kind, group in kinds.items() if len(group) >= kind.beside]
+    """Groups of one kind; those that would leave lanes empty are merged into one."""
+    large = [(kind, group) for kind, group in kinds.items() if len(group) >= kind.records]
     small: dict[tuple[bool, int, int], list[tuple[LaneKind, list[_Job]]]] = {}
     for kind, group in kinds.items():
-        if len(group) < kind.beside:
-            small.setdefault((kind.breathing, kind.throws, kind.oil), []).append((kind, group))
-    for (breathing, throws, oil), pool in small.items():
+        if len(group) < kind.records:
+            small.setdefault((kind.chambers, kind.throws, kind.oil), []).append((kind, group))
+    for (chambered, throws, oil), pool in small.items():
         kind = LaneKind(
             wrist=any(kind.wrist for kind, _ in pool),
             guide=any(kind.guide for kind, _ in pool),
-            breathing=breathing,
+            chambers=chambered,
             throws=throws,
             oil=oil,
             yields=any(kind.yields for kind, _ in pool),
@@ -141,8 +141,8 @@ def _together(
 
 
 def lane_job(plan: RunPlan) -> LaneJob:
-    """What a lane is told of a planned recording whose :func:`.lanes.lane_kind` is not None."""
-    tables, start = begun(plan.scene, plan.step, plan.first_angle)
+    """Lane job of a planned recording whose :func:`.lanes.lane_kind` is not None."""
+    tables, start = tables_and_start(plan.scene, plan.step, plan.first_angle)
     films = start_films(tables, start.bodies, plan.first_angle, start.journal)
     return LaneJob(
         tables=tables,

@@ -1,4 +1,4 @@
-"""Steps of all lanes side by side; those in which a contact changes, a lane at a time."""
+"""Steps of all lanes in parallel; those with a contact change, one record at a time."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from ..mechanism.layout import (
     CONTACTS,
     GUIDE,
 )
-from .chambers import breathe_alone, count_vapour, lanes_breathe
+from .chambers import count_vapour, step_chamber_alone, step_chambers
 from .lane_layout import (
     ALL_MOVING,
     CRANK,
@@ -26,35 +26,35 @@ from .one_lane import failed, step_alone
 from .rates import accelerate, beyond_limit, loads, rates
 
 STRETCH = 64
-"""Steps that are taken at once: what they leave fits a processor's second cache."""
+"""Steps taken together: their results fit a processor's second cache."""
 
-# one step more, or the columns would lie where the processor confuses them, multiples of 4096
+# one step more: columns at multiples of 4096 bytes would conflict in the cache
 LEFT = np.dtype(
     [
         ("turns", "f8", (2, STRETCH + 1, LANES)),  # angle and speed at the ends of the steps
         ("forces", "f8", (len(LANE_FORCES) + 2, STRETCH + 1, LANES)),  # the valves' last
         ("chambers", "f8", (len(GATHERED), STRETCH + 1, LANES)),
-        ("gaps", "f8", (2, STRETCH + 1, LANES)),  # of the films, and what their peaks carry
+        ("gaps", "f8", (2, STRETCH + 1, LANES)),  # of the films, and force of their asperities
     ]
 )
-"""What a stretch of steps leaves behind; one record, as ``STATE`` is."""
+"""Results of a stretch of steps; one record, like ``STATE``."""
 
 
 class Stretch(NamedTuple):
-    """What a stretch of steps leaves behind, and how it ended."""
+    """Results of a stretch of steps, and how it ended."""
 
     left: NDArray[Any]  # (1,) of LEFT
     code: NDArray[np.int64]  # (LANES,): of the first step that failed
     done: NDArray[np.int64]  # (LANES,): steps up to it
 
 
-# Rows within lanes, though lanes lie side by side: the compiler lays the outer loop into vectors,
-# and would unroll an inner one of so few turns instead.
+# Loops over rows inside loops over lanes, although lanes are contiguous: the compiler vectorises
+# the outer loop, and would unroll a short inner one over lanes.
 
 
 @kernel
 def _begin(p: Any, s: Any, first: int, rows: int) -> None:
-    """Keep where the step begins; its first rates lead to the second stage."""
+    """Save the start of the step; its rates lead to the second stage."""
     for lane in range(LANES):
         h = 0.5 * p.step[lane]
         for c in range(first, rows):
@@ -135,7 +135,7 @@ def _end_films(p: Any, s: Any) -> None:
 
 @subroutine
 def _to_second_stage(p: Any, s: Any, kind: Any) -> None:
-    """Keep where the step begins; its first rates lead to the second stage."""
+    """Save the start of the step; its rates lead to the second stage."""
     _begin(p, s, 0, MOVING)
     _keep_contacts(s, 0, 1)
     if kind.wrist:
@@ -186,7 +186,7 @@ def _to_last_stage(p: Any, s: Any, across: bool, oiled: bool) -> None:
 
 @subroutine
 def _to_end(p: Any, s: Any, left: Any, n: int, across: bool, oiled: bool) -> None:
-    """State at the end of step n, and the mean forces over it."""
+    """Compute the state at the end of step n, and the mean forces over it."""
     _end(p, s, 0, MOVING)
     if across:
         _end(p, s, MOVING, ALL_MOVING)
@@ -201,8 +201,8 @@ def _to_end(p: Any, s: Any, left: Any, n: int, across: bool, oiled: bool) -> Non
 
 
 @subroutine
-def _judge(p: Any, s: Any) -> int:
-    """Which lanes ask for a cut, and which have failed; how many of either."""
+def _check_step(p: Any, s: Any) -> int:
+    """Find lanes that need a cut, and lanes that failed; return their total number."""
     m, found = s.margin, 0
     for lane in range(LANES):
         least = min(
@@ -211,9 +211,9 @@ def _judge(p: Any, s: Any) -> int:
         )
         s.asks[lane] = 1.0 if least < 0.0 else 0.0
     if p.throws > 1:
-        _ask_together(p, s)
+        _share_cuts(p, s)
     for lane in range(LANES):
-        # what a step that is cut would have come to is no force of the run
+        # forces of a step that will be cut are not forces of the run
         s.peak[lane] = max(s.peak[lane], 0.0 if s.asks[lane] != 0.0 else s.high[lane])
         code = failed(s, beyond_limit(p, s, lane), lane)
         s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else code
@@ -223,8 +223,8 @@ def _judge(p: Any, s: Any) -> int:
 
 
 @kernel
-def _ask_together(p: Any, s: Any) -> None:
-    """A contact of one throw cuts the step of all throws of its record."""
+def _share_cuts(p: Any, s: Any) -> None:
+    """Cut the step of all throws of a record if a contact of one throw needs it."""
     n = p.throws
     for first in range(0, LANES - n + 1, n):
         asks = 0.0
@@ -235,10 +235,10 @@ def _ask_together(p: Any, s: Any) -> None:
 
 
 @subroutine
-def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
-    """Take the step again in the records that ask for it; leave those behind that fail in it.
+def _repeat_steps(chambered: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
+    """Repeat the step of records that need a cut; stop those that fail in it.
 
-    Returns how many have taken it again.
+    Returns the number of repeated steps.
     """
     again, n = 0, p.throws
     for first in range(0, LANES - n + 1, n):
@@ -246,9 +246,9 @@ def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
             continue
         if s.asks[first] != 0.0:
             again += 1
-            step_alone(first, p, s, a, k.left[0], step, breathing)
-            for lane in range(first, first + n if breathing else first):
-                breathe_alone(lane, p, s, a)
+            step_alone(first, p, s, a, k.left[0], step, chambered)
+            for lane in range(first, first + n if chambered else first):
+                step_chamber_alone(lane, p, s, a)
                 s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else s.bad[lane]
         code = _code_of_record(first, n, s)
         if code != 0:
@@ -259,18 +259,18 @@ def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
 
 @kernel
 def _code_of_record(first: int, n: int, s: Any) -> int:
-    """Status code of all throws, as the march of one record judges: chambers first, then bodies."""
+    """Status code of all throws in the order of the march of one record: chambers, then bodies."""
     code = 0
     for lane in range(first, first + n):
         own = int(s.bad[lane])
         if own == int(_CHOKED):
             return own
-        if code <= _LOST:  # the first throw that is beyond its limits
+        if code <= _LOST:  # the first throw beyond its limits
             code = max(code, own)
     return code
 
 
-_LOST, _CHOKED = 1, 4.0  # status codes of a state that is no number, and of a failed chamber
+_LOST, _CHOKED = 1, 4.0  # status codes of a non-finite state, and of a failed chamber
 
 
 @subroutine
@@ -301,13 +301,13 @@ def _keep_gaps(s: Any, left: Any, n: int) -> None:
 
 @subroutine
 def march(kind: Any, n: int, p: Any, s: Any, m: Any, a: Any, k: Any) -> None:
-    """Take n steps of all lanes, of one kind.
+    """Take n steps of all lanes of one kind.
 
-    Chambers are stepped before the rates at the end of a step are made, which so feel the pressure
-    that is found, not the extrapolated one. What asks for a cut does not depend on it, nor on what
-    a casing that yields does to the bearings: with one the accelerations wait for that.
+    Chambers are stepped before the rates at the end of a step are computed, which so use the actual
+    instead of the extrapolated pressure. Contact changes do not depend on that, nor on the motion
+    of bearings on a yielding casing, for which the accelerations wait.
     """
-    across, breathing = kind.guide, kind.breathing
+    across, chambered = kind.guide, kind.chambers
     left, oiled = k.left[0], kind.oil != DRY
     for step in range(n):
         _to_second_stage(p, s, kind)
@@ -317,23 +317,23 @@ def march(kind: Any, n: int, p: Any, s: Any, m: Any, a: Any, k: Any) -> None:
         _to_last_stage(p, s, across, oiled)
         rates(p, s, 1.0, kind, a.maps)
         _to_end(p, s, left, step, across, oiled)
-        with_care = lanes_breathe(p, s, a, k.code) if breathing else 0
+        with_care = step_chambers(p, s, a, k.code) if chambered else 0
         loads(p, s, 0.0, kind, a.maps)
-        found = _judge(p, s)
+        found = _check_step(p, s)
         if found > 0 or not kind.yields:
             accelerate(p, s)
         if found > 0:
-            again = _mend(breathing, p, s, a, k, step)
-            if breathing:
+            again = _repeat_steps(chambered, p, s, a, k, step)
+            if chambered:
                 with_care += again
-            if again > 0 and (breathing or kind.yields) and not oiled:
+            if again > 0 and (chambered or kind.yields) and not oiled:
                 loads(p, s, 0.0, kind, a.maps)
                 accelerate(p, s)
         if oiled:
             _keep_gaps(s, left, step)
-            if breathing:  # the march of one seeks its films anew under the pressure that it found
+            if chambered:  # as in the march of one: films at the actual pressure
                 rates(p, s, 0.0, kind, a.maps)
-        if breathing:
+        if chambered:
             _keep_chambers(p, s, left, step)
             if with_care > 0:
                 count_vapour(s, a)

@@ -1,4 +1,4 @@
-"""A record whose lanes ask for it is taken through its step by the march of one."""
+"""Steps of a single record out of its lanes, by the march of one."""
 
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from .rates import machine_of_lane
 
 
 class Alone(NamedTuple):
-    """What the march of one record is told and works on, by lane."""
+    """Tables and scratch memory of the march of one record, by lane."""
 
     throws: NDArray[Any]  # (LANES,) of THROW
     contacts: NDArray[Any]  # (LANES, 3) of CONTACT
@@ -40,12 +40,12 @@ class Alone(NamedTuple):
     work: Work
     chambers: NDArray[np.float64]  # (LANES, 8)
     forces: NDArray[np.float64]  # (1, 1 + n_throws * len(FORCES)): of one step
-    counts: NDArray[np.int64]  # (LANES, 5): but for vapour, in the lane of the first throw
+    counts: NDArray[np.int64]  # (LANES, 5): except vapour, in the lane of the first throw
     peak: NDArray[np.float64]  # (LANES, 1): in the lane of the first throw
 
 
 def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:
-    """Room for the march of one record, with the throws of these tables; maps of all."""
+    """Allocate the march of one record, with the throws of these tables and the maps of all."""
     n = len(t.throws)
     return Alone(
         throws=np.zeros(LANES, t.throws.dtype),
@@ -67,7 +67,7 @@ def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:
 
 @kernel
 def _tables_of(lane: int, p: Any, a: Any) -> Any:
-    """Of the record whose first throw is in a lane."""
+    """Tables of the record whose first throw is in a lane."""
     own = slice(lane, lane + p.throws)
     return Tables(
         a.throws[own],
@@ -85,7 +85,7 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
 
 @kernel
 def _to_record(lane: int, s: Any, w: Any) -> None:
-    """Copy a record's step into the march of one: its beginning into row 0, its end into 1."""
+    """Copy a record's step into the march of one: its start into row 0, its end into row 1."""
     w.crank[0, 0], w.crank[0, 1] = s.x0[CRANK, lane], s.v0[CRANK, lane]
     w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = s.v0[CRANK, lane], s.a0[CRANK, lane], 0.0
     w.crank[1, 0], w.crank[1, 1] = s.x[CRANK, lane], s.v[CRANK, lane]
@@ -100,7 +100,7 @@ def _throw_to_record(lane: int, k: int, s: Any, w: Any) -> None:
     for c in range(len(PLACES)):
         b.y[c], b.y[len(PLACES) + c] = s.x0[PLACES[c], lane], s.v0[PLACES[c], lane]
         b.rate[c], b.rate[len(PLACES) + c] = s.v0[PLACES[c], lane], s.a0[PLACES[c], lane]
-    end = w.stage[1, k]  # of the step as it was tried
+    end = w.stage[1, k]  # of the trial step
     for c in range(len(PLACES)):
         end.y[c], end.y[len(PLACES) + c] = s.x[PLACES[c], lane], s.v[PLACES[c], lane]
         end.rate[c], end.rate[len(PLACES) + c] = s.v[PLACES[c], lane], s.a[PLACES[c], lane]
@@ -119,7 +119,7 @@ def _throw_to_record(lane: int, k: int, s: Any, w: Any) -> None:
 
 @kernel
 def _from_record(lane: int, s: Any, w: Any, i: int) -> None:
-    """Copy row i of the march of one record into its lanes, as the stage looked at last."""
+    """Copy row i of the march of one record into its lanes, as their current stage."""
     for k in range(w.held.shape[0]):
         s.x[CRANK, lane + k], s.v[CRANK, lane + k] = w.crank[i, 0], w.crank[i, 1]
         s.a[CRANK, lane + k] = w.crank[i, 3]
@@ -148,17 +148,17 @@ _FORCE = tuple(FORCES.index(name) for name in LANE_FORCES)
 
 
 @subroutine
-def step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, breathing: bool) -> None:
-    """Take a step of one record by the march of one, which cuts it at its contacts.
+def step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, chambered: bool) -> None:
+    """Take a step of one record by the march of one, which cuts it at contact changes.
 
-    It begins with what lanes have tried, but for chambers: theirs ended under the pressure found.
+    It starts from the trial step of the lanes, except for chambers, which used another pressure.
     """
     w, h, t = a.work, p.step[lane], _tables_of(lane, p, a)
-    for row in range(1, 5):  # another record may have touched where this one cannot
+    for row in range(1, 5):  # another record may have left values that this one does not set
         for k in range(p.throws):
             for j in range(CONTACTS):
                 w.stage[row, k].margin[j] = NO_CHANGE
-    if breathing:  # of films too the search begins where it began
+    if chambered:  # the films' search starts from the same point too
         for k in range(p.throws):
             for c in range(2):
                 s.squeeze[c, lane + k] = s.squeeze0[c, lane + k]
@@ -166,10 +166,10 @@ def step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, breathin
     tally = Tally(a.counts[lane], a.peak[lane])
     for c in range(a.forces.shape[1]):
         a.forces[0, c] = 0.0
-    end, fresh = step_of_record(w, 0, h, True, not breathing, t, a.forces, 0, tally)
-    for k in range(p.throws):  # as the end of the step found them
+    end, fresh = step_of_record(w, 0, h, True, not chambered, t, a.forces, 0, tally)
+    for k in range(p.throws):  # as found at the end of the step
         s.gap[lane + k], s.carried[lane + k] = w.stage[end, k].gaps[0], w.stage[end, k].gaps[2]
-    if not fresh and not breathing:  # chambers are stepped first
+    if not fresh and not chambered:  # chambers are stepped first
         derivative_of_record(w, end, 0.0, t)
     _from_record(lane, s, w, end)
     for k in range(p.throws):
@@ -181,7 +181,7 @@ def step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, breathin
 
 @subroutine
 def enter_lane(lane: int, p: Any, s: Any, a: Any, oiled: bool) -> None:
-    """Begin a record in lanes from this one on: contacts closed from the start, and chambers."""
+    """Start a record in lanes from this one on: initial contacts and chambers."""
     w, t = a.work, _tables_of(lane, p, a)
     _to_record(lane, s, w)
     begin(w, t, a.chambers[lane : lane + p.throws])
@@ -191,7 +191,7 @@ def enter_lane(lane: int, p: Any, s: Any, a: Any, oiled: bool) -> None:
         for c in range(5):
             a.counts[lane + k, c] = 0
         a.peak[lane + k, 0] = 0.0
-    for _ in range(2 if oiled else 1):  # as the march of one does, which keeps the first films
+    for _ in range(2 if oiled else 1):  # as in the march of one, which keeps the first films
         derivative_of_record(w, 0, 0.0, t)
     _from_record(lane, s, w, 0)
     for k in range(p.throws):
@@ -200,7 +200,7 @@ def enter_lane(lane: int, p: Any, s: Any, a: Any, oiled: bool) -> None:
 
 @kernel
 def failed(s: Any, beyond: bool, lane: int) -> float:
-    """Status code of the end of a step, as the march of one record judges it."""
+    """Status code of the end of a step, by the criteria of the march of one record."""
     x, v = s.x, s.v
     total = x[0, lane] + x[1, lane] + x[2, lane] + x[3, lane] + x[4, lane] + x[5, lane] + x[6, lane]
     total += v[0, lane] + v[1, lane] + v[2, lane] + v[3, lane] + v[4, lane] + v[5, lane]

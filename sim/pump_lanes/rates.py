@@ -1,9 +1,8 @@
-"""Accelerations, forces and margins of all lanes: the equations of one throw, a lane each.
+"""Accelerations, forces and margins of all lanes: the equations of one throw in each lane.
 
-Joint by joint, each in a loop of its own over the lanes: what no lane has is passed over, and a
-short loop leaves the processor room to begin the next lanes while the first wait for a square root.
-What only some of the lanes have is told by numbers, not by branches, so that different machines lie
-side by side.
+Each joint has its own loop over the lanes: joints that no lane has are skipped, and a short loop
+lets the processor start the next lanes while the first wait for a square root. Differences between
+lanes are expressed by numbers, not by branches, so that different machines can run in parallel.
 """
 
 from typing import Any
@@ -55,8 +54,8 @@ from .lane_layout import (
 
 
 @kernel
-def _as_told(c: Any, plain: bool) -> Any:
-    """A contact, its laws known to the compiler where they are plain."""
+def _with_laws(c: Any, plain: bool) -> Any:
+    """Contact whose laws are known to the compiler if they are plain."""
     return ContactLane(
         float(LAW_KELVIN_VOIGT) if plain else c.law,
         float(ELASTIC_LINEAR) if plain else c.elasticity,
@@ -77,7 +76,7 @@ def _as_told(c: Any, plain: bool) -> Any:
 
 @kernel
 def machine_of_lane(p: Any, lane: int) -> Any:
-    """What the throws of the record in a lane share."""
+    """Quantities shared by the throws of the record in a lane."""
     return fields_of(Machine, p.machine, lane)
 
 
@@ -88,7 +87,7 @@ def _liquid_of(p: Any, lane: int) -> Any:
 
 @kernel
 def beyond_limit(p: Any, s: Any, lane: int) -> bool:
-    """Whether a lane's contacts have sunk in further than their laws hold."""
+    """Whether a lane's contacts exceed the penetration limit of their laws."""
     q, o = throw_of(p, lane), s.overlap
     pins = max(
         o[0, lane] - OVERLAP_LIMIT * q.crankpin_radius,
@@ -100,21 +99,21 @@ def beyond_limit(p: Any, s: Any, lane: int) -> bool:
 
 @subroutine
 def _turn(p: Any, s: Any) -> None:
-    """Sines and cosines in one loop: the compiler would unroll the short one of the rods alone."""
+    """Compute sines and cosines in one loop: the compiler would unroll a short one for the rods."""
     wide = 0
     for lane in range(LANES):
         angle, swing = s.x[CRANK, lane] + p.throw[0, lane], s.x[BETA, lane]
         s.turned[0, lane], s.turned[1, lane] = sine_cosine(angle)
         s.turned[2, lane], s.turned[3, lane] = near_sine_cosine(swing)
         wide += not abs(swing) <= NEAR
-    if wide > 0:  # rods swing more than this only where cranks are nearly as long
+    if wide > 0:  # rods swing this far only with cranks nearly as long
         for lane in range(LANES):
             s.turned[2, lane], s.turned[3, lane] = sine_cosine(s.x[BETA, lane])
 
 
 @subroutine
 def _press(p: Any, s: Any) -> None:
-    """Pressures that follow from the crank angle."""
+    """Pressures by crank angle."""
     for lane in range(LANES):
         h = _liquid_of(p, lane)
         level = two_level_pressure(s.x[CRANK, lane] + p.throw[0, lane], h.suction, h.discharge, h)
@@ -134,7 +133,7 @@ def _in_crankpin(p: Any, s: Any, plain: bool) -> None:
     for lane in range(LANES):
         q, c, pose, omega = (
             throw_of(p, lane),
-            _as_told(contact_of(p, 0, lane), plain),
+            _with_laws(contact_of(p, 0, lane), plain),
             lane_pose(s, lane),
             s.v[CRANK, lane],
         )
@@ -163,10 +162,10 @@ def _at_plain_crankpin(p: Any, s: Any) -> None:
 
 @kernel
 def _in_wristpin(p: Any, s: Any, plain: bool) -> None:
-    """A tight one never touches."""
+    """Contact of the wrist pins; an ideal one never touches."""
     for lane in range(LANES):
         q, pose = throw_of(p, lane), lane_pose(s, lane)
-        c = _as_told(contact_of(p, 1, lane), plain)
+        c = _with_laws(contact_of(p, 1, lane), plain)
         radius = q.wristpin_radius
         d_x, d_y, v_x, v_y = wrist_offset(pose, q, s.turned[2, lane], s.turned[3, lane])
         spin = pose.tilt_rate * radius + pose.beta_rate * (radius + c.clearance)
@@ -190,7 +189,7 @@ def _at_plain_wristpin(p: Any, s: Any) -> None:
 
 @subroutine
 def _tilt(s: Any) -> None:
-    """Pistons in guides with play, before their ends are looked at."""
+    """Tilt of pistons in guides with play, before their ends are computed."""
     for lane in range(LANES):
         s.tilted[0, lane], s.tilted[1, lane] = sine_cosine(s.x[TILT, lane])
         s.guide[0, lane] = s.guide[1, lane] = s.guide[2, lane] = s.overlap[2, lane] = 0.0
@@ -210,7 +209,7 @@ def _in_guide(p: Any, s: Any, along: float, j: int, plain: bool) -> None:
             s.impact[j, lane],
             s.touching[j + 2, lane] != 0.0,
             s.impact[j + 2, lane],
-            _as_told(contact_of(p, 2, lane), plain),
+            _with_laws(contact_of(p, 2, lane), plain),
         )
         s.margin[j, lane], s.approach[j, lane] = upper.margin, upper.approach
         s.margin[j + 2, lane], s.approach[j + 2, lane] = lower.margin, lower.approach
@@ -243,7 +242,7 @@ def _plain_front(p: Any, s: Any) -> None:
 
 @subroutine
 def _accelerate(p: Any, s: Any) -> None:
-    """Rods and pistons, and the forces on the casing."""
+    """Accelerations of rods and pistons, and the forces on the casing."""
     a, force = s.a, s.force
     for lane in range(LANES):
         q, m, pose = throw_of(p, lane), machine_of_lane(p, lane), lane_pose(s, lane)
@@ -256,7 +255,7 @@ def _accelerate(p: Any, s: Any) -> None:
         free = free_motion(
             q, m, on_face + seal, inv_px, pin, wrist, guide_x, guide_y, guide_turn, sin_b, cos_b
         )
-        # a factor of 1 or 0 changes no bit of what it keeps, and is no branch
+        # a factor of 1 or 0 preserves all bits and avoids a branch
         found, _, wrist_y = held_wrist(q, m, pose, free, inv_px, sin_b, cos_b, q.tight_wrist)
         a[ROD_X, lane], a[ROD_Y, lane], a[BETA, lane] = found.rod_x, found.rod_y, found.beta
         a[PISTON_X, lane], a[PISTON_Y, lane] = found.piston_x, found.piston_y
@@ -295,7 +294,7 @@ def _turn_crank(p: Any, s: Any) -> None:
 
 @subroutine
 def _turn_crank_together(p: Any, s: Any) -> None:
-    """Cranks of several throws, each of which has a copy: moved by what all do to it."""
+    """Acceleration of the cranks of several throws, which share one crank but have copies of it."""
     n = p.throws
     for lane in range(LANES):
         s.moment[lane] = _crank_moment(p, s, lane)
@@ -313,16 +312,16 @@ def _turn_crank_together(p: Any, s: Any) -> None:
 
 @kernel
 def rates(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
-    """Accelerations, forces and margins of all lanes; `share` of the step has passed."""
+    """Accelerations, forces and margins of all lanes, `share` of the step having passed."""
     loads(p, s, share, kind, maps)
     accelerate(p, s)
 
 
 @kernel
 def loads(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
-    """What the joints and the liquid do, and margins, of all lanes."""
+    """Loads of joints and liquid, and margins, of all lanes."""
     _turn(p, s)
-    if kind.breathing:
+    if kind.chambers:
         _press_chambers(s, share)
     else:
         _press(p, s)
@@ -348,7 +347,7 @@ def loads(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
 
 @kernel
 def accelerate(p: Any, s: Any) -> None:
-    """Accelerations and forces of all lanes under the loads that were found."""
+    """Accelerations and forces of all lanes under the present loads."""
     _accelerate(p, s)
     if p.driven != 0.0 and p.throws > 1:
         _turn_crank_together(p, s)

@@ -1,4 +1,4 @@
-"""Contacts of the joints: stiffness, damping, what mass they feel, how fast they ring."""
+"""Contacts of the joints: stiffness, damping, effective mass, frequencies."""
 
 import math
 from typing import Any
@@ -36,7 +36,7 @@ from ..mechanism.layout import (
 from ..scene.pump import PumpScene
 from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .ideal_motion import joint_loads, largest_bearing_load
-from .joints import has_main_play, joint_parts, joint_rungs, kept_by_scene
+from .joints import cached_by_scene, has_main_play, joint_parts, joint_rungs
 from .rods import rod_table
 
 
@@ -52,24 +52,24 @@ def contact_record(
     Parameters
     ----------
     part : RevoluteJoint or Guide
-        Of the scene, not ideal.
+        Part of the scene that is not ideal.
     clearance : float
-        Radial, or on either side of a guide [m].
+        Radial clearance, or on either side of a guide [m].
     load : float
-        Largest force of the ideal joint [N], which places the floor of the impact speed.
+        Largest force of the ideal joint [N], which sets the floor of the impact speed.
     mobility : float
         Largest acceleration of the contact per unit force [1/kg].
     slot : float
-        By which an eye is longer along its rod than across [m].
+        Length of an eye along its rod in excess of that across [m].
 
     Returns
     -------
     numpy.ndarray [shape=(1,), dtype=CONTACT]
-        Where the scene sets no ``speed_floor``, a hysteresis law gets the speed at which the
+        If the scene sets no ``speed_floor``, a hysteresis law gets the speed at which the
         damping of sustained contact under `load`, ``a F / v``, is twice the critical one: slower
-        impacts are swallowed whatever the law says, and without a floor the damping has no bound.
-        The swing of a massless link is damped by half the critical damping under `load`: what a
-        pin loses that slides along its eye to the other side.
+        impacts are overdamped for any law, and without a floor the damping is unbounded.
+        The swing of a massless link is damped by half the critical damping under `load`: the
+        energy that a pin loses when it slides along its eye to the other side.
     """
     record = np.zeros(1, dtype=CONTACT)
     kelvin_voigt = part.law == "kelvin-voigt"
@@ -103,7 +103,7 @@ def contact_record(
     for name, value in values.items():
         record[name] = value
     if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
-        # the film drags by itself, and squeezed oil is no part of the wall
+        # the film has its own drag, and squeezed oil is not part of the wall
         record["tangential_damping"] = 0.0
         told = part.oil.wall_damping
         spring = tangent_stiffness(record[0], load) if stiffness else 0.0
@@ -122,7 +122,7 @@ def contact_record(
 def penetration_under(contact: Any, force: float) -> float:
     """Penetration at which the elastic force of a contact record is `force` [m].
 
-    Bisection on the law, so that a further elasticity needs nothing here.
+    Bisection on the law, so that new elasticities need no change here.
     """
     high = 1e-9
     while elastic_force(high, contact) < force and high < 1.0:
@@ -142,11 +142,11 @@ def tangent_stiffness(contact: Any, force: float) -> float:
     return float(elastic_stiffness(penetration_under(contact, force), contact))
 
 
-_MOST_DAMPING = 2.0  # of the critical one, where a hysteresis law would have no bound
-_LINK_DAMPING = 0.5  # of the critical one
-_WALL_DAMPING = 0.1  # of sqrt(K m): bush, bolts and rod end in a row
+_MOST_DAMPING = 2.0  # of critical damping, for a hysteresis law without bound
+_LINK_DAMPING = 0.5  # of critical damping
+_WALL_DAMPING = 0.1  # of sqrt(K m): bush, bolts and rod end in series
 
-PEAK_OVER_LOAD = 3.0  # what a knock may add to the ideal load, where the elasticity is not linear
+PEAK_OVER_LOAD = 3.0  # factor on the ideal load for knocks, if the elasticity is non-linear
 
 
 def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
@@ -173,7 +173,7 @@ def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float
 
 
 def _flex_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
-    """The same rows per stretch and bow of an elastic rod, and below them these two themselves."""
+    """The same rows per stretch and bow of an elastic rod, followed by these two coordinates."""
     modes, rod = rod_table(scene)[0], scene.rod
     s, c = math.sin(beta), math.cos(beta)
     crank, wrist = 1 - rod.centre_of_mass / rod.length, -rod.centre_of_mass / rod.length
@@ -194,7 +194,7 @@ def _flex_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
 def _jacobian(
     scene: PumpScene, throw: int, beta: float, modes: NDArray[np.void]
 ) -> NDArray[np.float64]:
-    """Rows and columns of :func:`_rod_jacobian`, and two more of each where rods have modes."""
+    """Rows and columns of :func:`_rod_jacobian`, plus two of each if rods have modes."""
     rigid = _rod_jacobian(scene, throw, beta)
     if not len(modes):
         return rigid
@@ -204,13 +204,13 @@ def _jacobian(
 _JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
 
 
-@kept_by_scene
+@cached_by_scene
 def _compliances(scene: PumpScene, throw: int, flexing: int) -> NDArray[np.float64]:
     """Acceleration of every row of the jacobian per force along every other [1/kg].
 
-    At five swings of the rod, from none to its largest: shape (5, n, n), n = 8, or 10 with an
-    elastic rod that may flex (`flexing` 1). All throws that push a crank with play the same way are
-    felt by each as a crank of its share of the mass.
+    At five rod angles from zero to the largest: shape (5, n, n), n = 8, or 10 with an
+    elastic rod that may flex (`flexing` 1). Throws that push a crank with play in the same
+    direction each see a crank with their share of the mass.
     """
     rod, piston = scene.rod, scene.piston
     rungs = joint_rungs(scene, throw)
@@ -239,7 +239,7 @@ def _compliances(scene: PumpScene, throw: int, flexing: int) -> NDArray[np.float
 
 
 def _crank_mobility(scene: PumpScene) -> float:
-    """Acceleration of a crank with play per force that each of its throws adds [1/kg]."""
+    """Acceleration of a crank with play per force of each of its throws [1/kg]."""
     if not has_main_play(scene) or scene.crank.mass is None:
         return 0.0
     return len(scene.throws) / scene.crank.mass
@@ -257,20 +257,20 @@ def _betas(scene: PumpScene) -> NDArray[np.float64]:
 def joint_mobility(scene: PumpScene, throw: int, joint: int) -> float:
     """Largest acceleration of a joint per unit force in it, over a revolution [1/kg].
 
-    Of rigid rods: what a wall or a link loses by default may not depend on how finely its rod is
-    modelled.
+    For rigid rods: the default loss of a wall or a link must not depend on the model of the
+    rod.
     """
     rows = _JOINT_ROWS[joint]
     return float(np.linalg.eigvalsh(_compliances(scene, throw, 0)[:, rows, rows]).max())
 
 
 def _largest(scene: PumpScene, throw: int, weights: NDArray[np.float64]) -> float:
-    """Largest eigenvalue of the mechanism on springs (or dampers) along its rows."""
+    """Largest eigenvalue of the mechanism with springs (or dampers) along its rows."""
     root = np.sqrt(weights)
     return float(np.linalg.eigvalsh(root[:, None] * _compliances(scene, throw, 1) * root).max())
 
 
-@kept_by_scene
+@cached_by_scene
 def _springs_and_dampers(
     scene: PumpScene, throw: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -308,10 +308,10 @@ def _springs_and_dampers(
 def contact_frequency(scene: PumpScene) -> float:
     """Largest angular frequency of the mechanism on its undamped springs [rad/s].
 
-    These are its contacts, and its rods where they are elastic.
+    The springs are its contacts, and its rods if they are elastic.
 
-    The mass felt at a joint depends on the direction; its least value over a revolution sets the
-    fastest contact, and so the step. 0 where every joint is ideal and rods are rigid.
+    The effective mass of a joint depends on the direction; its least value over a revolution gives
+    the fastest contact, and so the step. 0 if every joint is ideal and rods are rigid.
     """
     return max(
         math.sqrt(_largest(scene, throw, _springs_and_dampers(scene, throw)[0]))
@@ -319,12 +319,12 @@ def contact_frequency(scene: PumpScene) -> float:
     )
 
 
-@kept_by_scene
+@cached_by_scene
 def contact_rate(scene: PumpScene) -> float:
     """Fastest rate of the damped contacts [1/s]: largest root of ``s^2 + C/m s + K/m``.
 
-    The contact's angular frequency while it oscillates; beyond critical damping the faster of
-    its two decays, which is what limits an explicit step.
+    The contact's angular frequency while it oscillates; above critical damping the faster of
+    its two decay rates, which limits an explicit step.
     """
     return max(_rate(scene, throw) for throw in _different_throws(scene))
 
@@ -336,7 +336,7 @@ def _rate(scene: PumpScene, throw: int) -> float:
 
 
 def _different_throws(scene: PumpScene) -> list[int]:
-    """Throws that differ in their joints from those before: equal ones have equal rates."""
+    """Throws whose joints differ from those of earlier ones: equal ones have equal rates."""
     seen: list[Any] = []
     found = []
     for throw in range(len(scene.throws)):
@@ -348,16 +348,16 @@ def _different_throws(scene: PumpScene) -> list[int]:
 
 
 def _worn_room(scene: PumpScene, part: RevoluteJoint | Guide) -> tuple[float, float]:
-    """Radial clearance across the rod, and by how much the eye is longer along it [m]."""
+    """Radial clearance across the rod, and the eye's additional length along it [m]."""
     if isinstance(part, Guide) or scene.wear is None:
         return part.clearance_radial, 0.0
     slot = part.one_sided * max(part.clearance_diametral - scene.wear.as_new, 0.0)
     return part.clearance_radial - slot / 2, slot
 
 
-@kept_by_scene
+@cached_by_scene
 def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
-    """Contact records of one throw: crank pin, wrist pin, guide; an ideal joint's is empty.
+    """Contact records of one throw: crank pin, wrist pin, guide; an ideal joint has an empty one.
 
     Returns
     -------
@@ -377,9 +377,9 @@ def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
     return table
 
 
-@kept_by_scene
+@cached_by_scene
 def bore_table(scene: PumpScene) -> NDArray[np.void]:
-    """Contact record of a crank's journal in main bearings with play; empty without.
+    """Contact record of a crank's journal with play in its main bearings; empty without play.
 
     Returns
     -------

@@ -22,12 +22,12 @@ from .ideal_motion import (
     joint_loads,
     largest_bearing_load,
 )
-from .joints import joint_parts, kept_by_scene
+from .joints import cached_by_scene, joint_parts
 
 _WALL_PER_STEP = (
-    0.7  # least damping of a wall behind oil over stiffness times step: RK4 resolves it
+    0.7  # least damping of a wall behind oil, over stiffness times step: RK4 resolves it
 )
-_DEEPEST_START = 0.9  # eccentricity from which a film starts
+_DEEPEST_START = 0.9  # largest eccentricity at the start of a film
 
 
 def joint_maps(scene: PumpScene) -> dict[float, ImpedanceMap]:
@@ -46,18 +46,18 @@ def joint_maps(scene: PumpScene) -> dict[float, ImpedanceMap]:
     }
 
 
-_N_THETA, _N_Z = 144, 33  # carry within half a percent of published tables up to e = 0.95
+_N_THETA, _N_Z = 144, 33  # load capacity within half a percent of published tables up to e = 0.95
 
 
 def runs_on_a_map(part: RevoluteJoint) -> bool:
-    """Whether a film of finite length is asked for: a starved one is narrow, and short."""
+    """Whether a film of finite length is used: a starved one is narrow, and counts as short."""
     if part.oil is None:
         return False
     return part.rung == "film-map" or (part.rung == "mixed" and part.oil.filled_gap is None)
 
 
 def _land(part: RevoluteJoint) -> float:
-    """Length of film between two ends without pressure [m]."""
+    """Length of film between two unpressurised ends [m]."""
     assert part.oil is not None
     both = part.oil.length - part.oil.groove_width
     return both / 2 if part.oil.groove_width > 0 else both
@@ -66,19 +66,19 @@ def _land(part: RevoluteJoint) -> float:
 def oil_table(
     scene: PumpScene, throw: int, contacts: NDArray[np.void], maps: dict[float, Any], step: float
 ) -> NDArray[np.void]:
-    """Records of the oil in crank pin and wrist pin of one throw; zeros where there is none.
+    """Oil records of crank pin and wrist pin of one throw; zeros without oil.
 
     Parameters
     ----------
     scene : PumpScene
     throw : int
-        Counted from 0.
+        Throw, counted from 0.
     contacts : numpy.ndarray [shape=(3,), dtype=CONTACT]
-        Of the throw.
+        Contacts of the throw.
     maps : dict
-        As :func:`joint_maps` gives them.
+        Result of :func:`joint_maps`.
     step : float
-        [s]
+        Integration step [s].
 
     Returns
     -------
@@ -96,7 +96,7 @@ def oil_table(
 
 
 def bore_oil_table(scene: PumpScene, maps: dict[float, Any], step: float) -> NDArray[np.void]:
-    """Record of the oil in main bearings with play, zeros where they are dry; empty without play.
+    """Oil record of main bearings with play; zeros if they are dry, empty without play.
 
     Returns
     -------
@@ -113,9 +113,9 @@ def bore_oil_table(scene: PumpScene, maps: dict[float, Any], step: float) -> NDA
     return table
 
 
-@kept_by_scene
+@cached_by_scene
 def film_temperature_of(scene: PumpScene, throw: int, joint: int) -> float | None:
-    """Temperature at which the film of a pin runs, by its heat balance [K].
+    """Film temperature of a pin, by its heat balance [K].
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def film_temperature_of(scene: PumpScene, throw: int, joint: int) -> float | Non
     Returns
     -------
     float or None
-        None of a pin that is not asked for one: its oil is as warm as the scene says.
+        None if the scene has no heat balance for the pin: its oil has the scene's temperature.
     """
     part = joint_parts(scene, throw)[joint]
     if not isinstance(part, RevoluteJoint) or not _is_heated(part):
@@ -134,9 +134,9 @@ def film_temperature_of(scene: PumpScene, throw: int, joint: int) -> float | Non
     return _heat_balance(part, *_usual_spin_and_load(scene, throw)[joint])
 
 
-@kept_by_scene
+@cached_by_scene
 def bore_temperature(scene: PumpScene) -> float | None:
-    """The same of the film of the main bearings [K]."""
+    """Film temperature of the main bearings [K]; None as in :func:`film_temperature_of`."""
     part = scene.crank.bearing
     if part is None or not _is_heated(part):
         return None
@@ -146,14 +146,14 @@ def bore_temperature(scene: PumpScene) -> float | None:
 
 
 def _is_heated(part: RevoluteJoint) -> bool:
-    """Whether a joint has a film that is asked for its heat balance."""
+    """Whether a joint has a film with a heat balance."""
     if part.rung not in OILED_RUNGS or part.oil is None:
         return False
     return bool(part.oil.carried_per_kelvin) and part.oil.temperature is not None
 
 
 def _heat_balance(part: RevoluteJoint, spin: float, load: float) -> float:
-    """Temperature of a film [K] by root mean squares of its spin [rad/s] and load [N]."""
+    """Temperature of a film [K] from the root mean squares of its spin [rad/s] and load [N]."""
     oil = part.oil
     assert oil is not None
     assert oil.temperature is not None
@@ -178,7 +178,7 @@ def _usual_spin_and_load(scene: PumpScene, throw: int) -> list[tuple[float, floa
     angle = np.linspace(0.0, math.tau, LOAD_ANGLES, endpoint=False)
     motion = ideal_motion(scene, angle, throw)
     turning = math.tau * scene.drive.speed
-    # sin(beta) = (r / l) sin(a): the rod swings against crank and piston
+    # sin(beta) = (r / l) sin(a): the rod swings relative to crank and piston
     ratio, own = scene.crank.radius / scene.rod.length, angle + scene.throws[throw].phase
     swing = turning * ratio * np.cos(own) / np.sqrt(1 - (ratio * np.sin(own)) ** 2)
 
@@ -236,7 +236,7 @@ def _oil_values(
 
 
 def deepest_start(offset: NDArray[np.float64], contact: Any) -> NDArray[np.float64]:
-    """Where a film begins to let a pin be that begins at an offset from its eye's centre [m]."""
+    """Initial film position of a pin at an offset from its eye's centre [m]."""
     most, size = _DEEPEST_START * float(contact["clearance"]), float(np.hypot(*offset))
     return offset * min(1.0, most / size) if size > 0 else offset
 
@@ -244,9 +244,9 @@ def deepest_start(offset: NDArray[np.float64], contact: Any) -> NDArray[np.float
 def start_films(
     t: Tables, bodies: NDArray[np.float64], angle: float, journal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Where the films let the pins be at the start, by the scene's own pins; zeros without oil.
+    """Film positions of the pins at the start; zeros without oil.
 
-    `journal` is where that of the crank begins in its main bearing [shape=(6,)].
+    `journal` is the initial state of the crank's journal in its main bearing [shape=(6,)].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The closed form of an ideal mechanism: motion, pressure and seal, loads of the joints."""
+"""Closed form of an ideal mechanism: motion, pressure and seal, loads of the joints."""
 
 import math
 from typing import Any
@@ -12,10 +12,10 @@ from ..jit import kernel
 from ..mechanism.layout import THROW
 from ..mechanism.throw_motion import seal_drag
 from ..scene.pump import PumpScene
-from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS
-from .joints import gravity_along_and_across, hydraulics_under, kept_by_scene, piston_area
+from ..scene.pump_hydraulics import CHAMBER_RUNGS, PIPED_RUNGS
+from .joints import cached_by_scene, gravity_along_and_across, hydraulics_under, piston_area
 
-LOAD_ANGLES = 360  # of a revolution, for the forces an ideal mechanism would carry
+LOAD_ANGLES = 360  # per revolution, for the forces of an ideal mechanism
 
 
 def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -> IdealCrank:
@@ -27,13 +27,13 @@ def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -
     angle : numpy.ndarray
         Crank angle of the first throw [rad].
     throw : int
-        Counted from 0.
+        Throw, counted from 0.
 
     Returns
     -------
     IdealCrank
-        With the pressure of the scene's rung; a chamber, which has a memory, is stood in for by
-        its two levels.
+        With the pressure of the scene's rung; a chamber, which has a memory, is replaced by its two
+        levels.
     """
     speed = 2 * math.pi * scene.drive.speed
     gravity_x, gravity_y = gravity_along_and_across(scene)
@@ -57,7 +57,7 @@ def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -
 def bearing_load(scene: PumpScene, angle: NDArray[np.float64]) -> NDArray[np.float64]:
     """Force of the crank on its main bearings without play at constant speed (x, y) [N].
 
-    Its own weight, which takes a ``crank.mass``, and its unbalance included.
+    Includes its own weight, if ``crank.mass`` is given, and its unbalance.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def bearing_load(scene: PumpScene, angle: NDArray[np.float64]) -> NDArray[np.flo
     return np.asarray(load)
 
 
-@kept_by_scene
+@cached_by_scene
 def largest_bearing_load(scene: PumpScene) -> float:
     """Largest of :func:`bearing_load` over a revolution [N]."""
     load = bearing_load(scene, np.linspace(0.0, 2 * math.pi, LOAD_ANGLES, endpoint=False))
@@ -89,9 +89,9 @@ def largest_bearing_load(scene: PumpScene) -> float:
 def forces_on_piston(
     scene: PumpScene, motion: IdealCrank, own: NDArray[np.float64], throw: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Forces of liquid and seal along x on the piston of a motion without clearance [N].
+    """Forces of liquid and seal along x on the piston of a mechanism without clearance [N].
 
-    `own` are the crank angles of the throw itself [rad].
+    `own` are the throw's own crank angles [rad].
     """
     speed, acceleration = 2 * math.pi * scene.drive.speed, motion.piston_acceleration
     pressure, added, drag = np.empty((3, own.size))
@@ -144,7 +144,7 @@ def seal_numbers(scene: PumpScene) -> dict[str, float]:
 
 def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
     pressure = scene.pressures(throw)
-    if pressure.rung in BREATHING_RUNGS:
+    if pressure.rung in CHAMBER_RUNGS:
         suction, discharge = pressure.suction, pressure.discharge
         if pressure.rung in PIPED_RUNGS:
             suction, discharge = pressure.at_pump
@@ -153,7 +153,7 @@ def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
     return hydraulics_under(scene, pressure)
 
 
-@kept_by_scene
+@cached_by_scene
 def joint_loads(scene: PumpScene, throw: int) -> tuple[float, float, float]:
     """Largest forces of crank pin, wrist pin and guide over a revolution, without clearance [N]."""
     motion = ideal_motion(scene, np.linspace(0.0, 2 * math.pi, LOAD_ANGLES, endpoint=False), throw)

@@ -1,4 +1,4 @@
-"""Joints and cylinder of every throw of a scene, by the codes of the kernels."""
+"""Joints and cylinder of every throw of a scene, as codes of the kernels."""
 
 import math
 from collections import OrderedDict
@@ -26,11 +26,11 @@ JOINT_CODES = {
 Result = TypeVar("Result")
 
 
-def kept_by_scene(function: Callable[..., Result]) -> Callable[..., Result]:
-    """Keep the last results of a function of a scene, and of a throw where it has one.
+def cached_by_scene(function: Callable[..., Result]) -> Callable[..., Result]:
+    """Cache the latest results of a function of a scene, and of a throw if it takes one.
 
-    Scenes are frozen, and several checks of one run ask for the same of them; what is kept cannot
-    be written to. A scene is known by its identity: a hash of all its values takes as long as
+    Scenes are frozen, and several checks of one run need the same results; the cached ones are
+    read-only. A scene is identified by its id: hashing all its values takes as long as
     most of these functions.
     """
     found: OrderedDict[tuple[int, ...], tuple[PumpScene, Result]] = OrderedDict()
@@ -39,7 +39,7 @@ def kept_by_scene(function: Callable[..., Result]) -> Callable[..., Result]:
     def kept(scene: PumpScene, *throw: int) -> Result:
         key = (id(scene), *throw)
         _, result = found.get(key) or (scene, function(scene, *throw))
-        found[key] = scene, result  # no other scene takes the identity of one that is held
+        found[key] = scene, result  # the cached scene keeps its id from being reused
         while len(found) > _MOST_KEPT:
             found.popitem(last=False)
         return result
@@ -68,17 +68,17 @@ def joint_rungs(scene: PumpScene, throw: int) -> tuple[int, int, int]:
 
 
 def has_main_play(scene: PumpScene) -> bool:
-    """Whether the crank has play in its main bearings, and so a motion of its own."""
+    """Whether the crank has play in its main bearings, and so moves as a body."""
     return scene.crank.bearing is not None and scene.crank.bearing.rung != "ideal"
 
 
 def hydraulics_of(scene: PumpScene, throw: int) -> NDArray[np.void]:
-    """Hydraulics of one throw, one record."""
+    """Hydraulics of one throw, as one record."""
     return hydraulics_under(scene, scene.pressures(throw))
 
 
 def hydraulics_under(scene: PumpScene, pressure: CylinderPressure) -> NDArray[np.void]:
-    """Hydraulics under one pressure of the scene, one record."""
+    """Hydraulics for one pressure of the scene, as one record."""
     return hydraulic_parameters(
         pressure,
         area=piston_area(scene),
@@ -89,7 +89,7 @@ def hydraulics_under(scene: PumpScene, pressure: CylinderPressure) -> NDArray[np
 
 
 def piston_area(scene: PumpScene) -> float:
-    """Area that the liquid pushes on [m^2]."""
+    """Area of the piston under the liquid's pressure [m^2]."""
     return math.pi / 4 * scene.piston.diameter**2
 
 

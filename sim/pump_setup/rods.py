@@ -1,4 +1,4 @@
-"""Modes of elastic rods, from what the scene says of their section."""
+"""Modes of elastic rods, from the scene's data of their section."""
 
 import math
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from ..mechanism.layout import ROD_MODES
 from ..scene.pump import PumpScene
-from .joints import kept_by_scene
+from .joints import cached_by_scene
 
 
 def buckling_load(scene: PumpScene) -> float:
-    """Euler's load of a rod between its pins [N]; infinite where rods are rigid."""
+    """Euler's load of a rod between its pins [N]; infinite if rods are rigid."""
     rod = scene.rod
     if rod.rung == "rigid" or rod.section_area is None or rod.section_radius is None:
         return math.inf
@@ -19,13 +19,13 @@ def buckling_load(scene: PumpScene) -> float:
     return math.pi**2 * bending / rod.length**2
 
 
-@kept_by_scene
+@cached_by_scene
 def rod_table(scene: PumpScene) -> NDArray[np.void]:
-    """Modes of the rod of every throw, alike; empty where rods are rigid.
+    """Modes of the rod of every throw, all equal; empty if rods are rigid.
 
-    The axial shape is an even stretch: its stiffness is that of the shank under a steady pull, its
-    mass follows from the rod's inertia whatever lies where. The bending shape is the half sine of
-    a beam between two pins, made free of the rod's motion as a whole.
+    The axial shape is a uniform stretch: its stiffness is that of the shank under a steady force,
+    its mass follows from the rod's inertia for any mass distribution. The bending shape is the half
+    sine of a beam between two pins, less its rigid-body part.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def rod_table(scene: PumpScene) -> NDArray[np.void]:
         return np.zeros(0, ROD_MODES)
     length, centre, shank = rod.length, rod.centre_of_mass, rod.shank_mass
     pull = rod.elastic_modulus * rod.section_area
-    lift = 2 / math.pi * shank  # of the half sine: its mass, and its mass times its place
+    lift = 2 / math.pi * shank  # for the half sine: its mass, and its first moment of mass
     tilt = lift * (length / 2 - centre)
     moved, turned = lift / rod.mass, tilt / rod.inertia
     stretch_mass = rod.inertia / length**2

@@ -1,4 +1,4 @@
-"""Tables of the crank mechanism, and where it starts: bodies, chambers, lines."""
+"""Tables of the crank mechanism, and its initial state: bodies, chambers, lines."""
 
 import math
 from typing import Any, NamedTuple
@@ -37,11 +37,11 @@ from .joints import (
 from .rods import rod_table
 
 _BAUMGARTE_PER_RADIAN = 30.0
-"""Decay rate of constraint drift over the crank speed. Not over the step: a rate that grew as the
-step shrinks would feed the stages' own drift back as a force that never shrinks, order 1."""
+"""Decay rate of constraint drift over the crank speed. It does not scale with the step: a rate that
+grows as the step shrinks would turn the stages' own drift into a force of first order."""
 
 _BAUMGARTE_PER_STEP = 0.1
-"""Most of that rate times the step, far from RK4's limit of 2.8."""
+"""Largest product of that rate and the step, far below RK4's limit of 2.8."""
 
 
 def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
@@ -55,7 +55,7 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
     crankpin, wristpin, guide = joint_rungs(scene, throw)
     free = guide == JOINT_COMPLIANT
     liquid = hydraulics_of(scene, throw)[0]
-    breathing = int(liquid["rung"]) == PRESSURE_CHAMBER
+    chambered = int(liquid["rung"]) == PRESSURE_CHAMBER
     record = np.zeros(1, dtype=THROW)
     values = {
         "phase": scene.throws[throw].phase,
@@ -77,7 +77,7 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
         "guide_half_length": joint.guide.length / 2 if joint.guide else 0.0,
         "guide_half_height": joint.guide.height / 2 if joint.guide else 1.0,
         "pressure_rung": liquid["rung"],
-        "substeps": chamber_substeps(liquid, step) if breathing else 1,
+        "substeps": chamber_substeps(liquid, step) if chambered else 1,
     }
     for name, value in (values | seal_numbers(scene)).items():
         record[name] = value
@@ -85,7 +85,7 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
 
 
 def bearing_record(scene: PumpScene) -> NDArray[np.void]:
-    """Kernel record of main bearings with play, empty where there are none.
+    """Kernel record of main bearings with play, empty if there are none.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def bearing_record(scene: PumpScene) -> NDArray[np.void]:
 
 
 def tables(scene: PumpScene, step: float) -> Tables:
-    """Everything the mechanism's kernel needs of a scene, at this step [s]."""
+    """All inputs of the mechanism's kernel from a scene, at this step [s]."""
     throws = range(len(scene.throws))
     contacts = [contact_table(scene, throw) for throw in throws]
     maps = joint_maps(scene)
@@ -112,7 +112,7 @@ def tables(scene: PumpScene, step: float) -> Tables:
         oils=np.stack([oil_table(scene, throw, contacts[throw], maps, step) for throw in throws]),
         maps=np.concatenate([np.zeros(1), *(m.table.coefficients.ravel() for m in maps.values())]),
         bearing=bearing_record(scene),
-        bore=bore_table(scene).copy(),  # of read-only arrays the kernel would be compiled again
+        bore=bore_table(scene).copy(),  # a read-only array would cause another compilation
         bore_oil=bore_oil_table(scene, maps, step),
         flex=rod_table(scene).copy(),
         machine=Machine(
@@ -132,7 +132,7 @@ def tables(scene: PumpScene, step: float) -> Tables:
 
 
 def start_state(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64]:
-    """State of every throw in which its pins rest in their eyes under the ideal joint's forces.
+    """State of every throw with its pins at rest in their eyes under the ideal joints' forces.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def start_state(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64
     angle : float
         Crank angle [rad].
     t : Tables
-        Of the scene.
+        Tables of the scene.
 
     Returns
     -------
@@ -153,13 +153,13 @@ def start_state(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64
 
 
 def start_journal(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64]:
-    """Place of the journal where it rests in its bore under the ideal joints' forces, and speed.
+    """Position of the journal at rest in its bore under the ideal joints' forces, and velocity.
 
     Returns
     -------
     numpy.ndarray [shape=(6,)]
-        From the centre of its bore (x, y) [m], how fast [m/s], and where its film lets it be [m];
-        0 where it has no play.
+        From the centre of its bore (x, y) [m], velocity [m/s], and film position [m]; 0 without
+        play.
     """
     if not len(t.bearing):
         return np.zeros(6)
@@ -169,7 +169,7 @@ def start_journal(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float
 
 
 def _rest(contact: Any, rung: int, force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where a pin rests from its eye's centre under a force on the rod."""
+    """Rest position of a pin from its eye's centre under a force on the rod."""
     size = float(np.hypot(*force))
     if rung == JOINT_IDEAL:
         return np.zeros(2)
@@ -198,7 +198,7 @@ def _throw_start(
         across = -math.copysign(float(contacts[GUIDE]["clearance"]) + pressed, force)
     pin = journal + radius * np.array([math.cos(own), math.sin(own)])
     eye = pin - at_pin
-    # out of reach only where the contact is far too soft: the run then says so by its status
+    # out of reach only if the contact is far too soft: the run's status then reports it
     sin_b = min(1.0, max(-1.0, (eye[1] - across + at_wrist[1]) / length))
     beta = math.asin(sin_b)
     cos_b = math.cos(beta)
@@ -225,7 +225,7 @@ def _throw_start(
 
 
 def start_chambers(t: Tables, bodies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """State of every chamber at the start; zeros where there is none.
+    """State of every chamber at the start; zeros without chambers.
 
     Returns
     -------
@@ -239,13 +239,13 @@ def start_chambers(t: Tables, bodies: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def lines_of(scene: PumpScene, step: float) -> LinePair | None:
-    """Suction and discharge line of a scene, with the pump's mean flow in them; None without.
+    """Suction and discharge line of a scene, with the pump's mean flow in them; None without lines.
 
     Parameters
     ----------
     scene : PumpScene
     step : float
-        [s]
+        Integration step [s].
 
     Examples
     --------
@@ -279,7 +279,7 @@ def lines_of(scene: PumpScene, step: float) -> LinePair | None:
 
 
 class Start(NamedTuple):
-    """Where a mechanism begins; as :func:`run_mechanism` is told it."""
+    """Initial state of a mechanism, as passed to :func:`run_mechanism`."""
 
     angle: float
     speed: float
@@ -288,8 +288,8 @@ class Start(NamedTuple):
     journal: NDArray[np.float64]
 
 
-def begun(scene: PumpScene, step: float, start_angle: float) -> tuple[Tables, Start]:
-    """Tables of a scene for a step [s], and where its mechanism begins at a crank angle [rad]."""
+def tables_and_start(scene: PumpScene, step: float, start_angle: float) -> tuple[Tables, Start]:
+    """Tables of a scene for a step [s], and the state at a crank angle [rad]."""
     t = tables(scene, step)
     bodies = start_state(scene, start_angle, t)
     speed = 2 * math.pi * scene.drive.speed

@@ -1,4 +1,4 @@
-"""What the mechanism does to a casing, and how a casing that yields carries its main bearing."""
+"""Forces of the mechanism on the casing, and how a yielding casing carries its main bearing."""
 
 from collections.abc import Sequence
 
@@ -17,12 +17,12 @@ from ..mechanism.layout import (
     Yielding,
 )
 from ..scene.pump import GUIDE_PLACES, VALVE_PLACES, PumpScene
-from ..scene.pump_hydraulics import BREATHING_RUNGS
+from ..scene.pump_hydraulics import CHAMBER_RUNGS
 from .joints import has_main_play, joint_rungs
 
 
 def throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]]:
-    """Places of the casing, the force of the mechanism behind each, and its sign there."""
+    """Places on the casing, the force of the mechanism at each, and its sign."""
     reactions = [
         *_on_bearing(scene),
         ("guide_y", "guide_y", -1.0),
@@ -32,13 +32,13 @@ def throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]
         reactions.append(("cylinder_x", "seal_x", -1.0))
     if rubs_in_guide(scene, throw):
         reactions += [(place, place, -1.0) for place in GUIDE_PLACES]
-    if scene.pressures(throw).rung in BREATHING_RUNGS:
+    if scene.pressures(throw).rung in CHAMBER_RUNGS:
         reactions += [(place, place, 1.0) for place in VALVE_PLACES]
     return reactions
 
 
 def _on_bearing(scene: PumpScene) -> list[tuple[str, str, float]]:
-    """What a throw does to its main bearing; of a journal with play every throw's has its share."""
+    """Forces of a throw on its main bearing; a journal with play spreads them over all throws."""
     if not has_main_play(scene):
         return [("bearing_x", "pin_x", -1.0), ("bearing_y", "pin_y", -1.0)]
     share = 1 / len(scene.throws)
@@ -51,11 +51,11 @@ def rubs_in_guide(scene: PumpScene, throw: int) -> bool:
 
 
 def yielding_of(scene: PumpScene, step: float) -> Yielding:
-    """Casing that carries the main bearing along, of the rung `yielding`; else one at rest.
+    """Casing that carries the main bearing, for the rung `yielding`; else one at rest.
 
-    Its modes are those of the casing on its feet as they are, and exact for a force that is even
-    over a step [s]; a mode of more than half a turn in it is left out, as is the unbalance of the
-    crank itself, far below the first of them.
+    Its modes are those of the casing on its present feet, and exact for a force that is constant
+    over a step [s]. Modes with more than half a cycle per step are omitted, as is the
+    unbalance of the crank, whose frequency is far below the first mode.
     """
     if scene.casing.rung != "yielding":
         return AT_REST
@@ -89,19 +89,20 @@ def yielding_of(scene: PumpScene, step: float) -> Yielding:
 def step_of_modes(
     modes: Sequence[tuple[float, float]], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean acceleration of modes over a step, and their place after it.
+    """Mean acceleration of modes over a step, and their displacement and speed after it.
 
     Parameters
     ----------
     modes : sequence of (float, float)
         Frequency [Hz] and damping ratio.
     step : float
-        [s]
+        Integration step [s].
 
     Returns
     -------
     react, reach : ndarray of shape (n_modes, 3)
-        Per force, which is even over the step, and per place and speed before it; unit modal mass.
+        Per force, constant over the step, and per displacement and speed before it; unit modal
+        mass.
     """
     react, reach = np.empty((len(modes), 3)), np.empty((len(modes), 3))
     for row, (frequency, damping_ratio) in enumerate(modes):
@@ -113,11 +114,11 @@ def step_of_modes(
 
 
 def _held(scene: PumpScene) -> NDArray[np.float64]:
-    """Force on each mode per acceleration of what is held to the bearing [kg^0.5], (n_modes, 2).
+    """Force on each mode per acceleration of the masses held by the bearing [kg^0.5], (n_modes, 2).
 
-    A rigid crank pin takes piston and rod along the stroke; across it pin and guide share them,
-    the rod as its mass lies. Past a crank pin with play the guide has the piston and what a free
-    rod leaves to it; what the pin's contact makes of it within a step is little.
+    A rigid crank pin holds piston and rod along the stroke; across it pin and guide share them,
+    according to the rod's mass distribution. With play in the crank pin, the guide holds the piston
+    and the share of a free rod; the effect of the pin's contact within a step is small.
     """
     held = np.zeros((len(scene.casing.modes), 2))
     for k in range(len(scene.throws)):
@@ -134,7 +135,7 @@ def _held(scene: PumpScene) -> NDArray[np.float64]:
 
 
 def guide_gain(scene: PumpScene) -> float:
-    """Acceleration of a bearing across the stroke by what its guides carry, per that of these.
+    """Acceleration of a bearing across the stroke per acceleration of its guides' load.
 
     Examples
     --------
@@ -152,7 +153,7 @@ def guide_gain(scene: PumpScene) -> float:
 
 
 def _held_masses(scene: PumpScene, throw: int) -> tuple[float, float, float]:
-    """Masses that a bearing feels along the stroke, and across it at pin and guide [kg]."""
+    """Masses acting on a bearing along the stroke, and across it at pin and guide [kg]."""
     piston, rod = scene.piston.mass, scene.rod.mass
     if joint_rungs(scene, throw)[CRANKPIN] < JOINT_COMPLIANT:
         at_pin = rod * scene.rod.centre_of_mass / scene.rod.length
@@ -163,7 +164,7 @@ def _held_masses(scene: PumpScene, throw: int) -> tuple[float, float, float]:
 
 
 def bearing_shapes(scene: PumpScene) -> NDArray[np.float64]:
-    """Shapes of the casing's modes at the main bearing, the mean of all throws'.
+    """Shapes of the casing's modes at the main bearing, averaged over the throws.
 
     Returns
     -------
@@ -182,12 +183,12 @@ def bearing_shapes(scene: PumpScene) -> NDArray[np.float64]:
 def bearing_mass_ratios(scene: PumpScene) -> dict[str, float]:
     """Apparent mass of the casing at its main bearing above all its modes, over one throw's masses.
 
-    A force there that is shorter than any mode's period moves it as ``1 / sum(shape^2)`` would.
+    A force shorter than the period of any mode moves it as ``1 / sum(shape^2)``.
 
     Returns
     -------
     dict of str to float
-        Way -> ratio, of those in which the casing moves there.
+        Direction -> ratio, for those in which the casing moves there.
     """
     if not scene.casing.modes:
         return {}

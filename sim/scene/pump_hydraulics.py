@@ -347,7 +347,7 @@ class PressureSensor(Part):
 PIPED_RUNGS = ("lumped-lines", "wave-lines")
 """Rungs of the pressure with pipes between the valves and the reservoirs."""
 
-BREATHING_RUNGS = ("chamber", *PIPED_RUNGS)
+CHAMBER_RUNGS = ("chamber", *PIPED_RUNGS)
 """Rungs of the pressure with a compressible chamber and moving valves."""
 
 
@@ -501,7 +501,7 @@ class CylinderPressure(Part):
 
     def _deadlock(self) -> list[str]:
         inlet, outlet = self.suction_valve, self.discharge_valve
-        if self.rung not in BREATHING_RUNGS or inlet is None or outlet is None:
+        if self.rung not in CHAMBER_RUNGS or inlet is None or outlet is None:
             return []
         if outlet.stuck_lift != 0 or (inlet.stuck_lift or 0) > 0:
             return []

@@ -1,4 +1,4 @@
-"""A line in steady running: at rest on its films, and the rotor about that."""
+"""A shaft line in steady running: its equilibrium on the films, and the rotor about it."""
 
 import math
 from collections.abc import Mapping
@@ -19,12 +19,12 @@ from .line_alignment import hull_deflection, hull_shape
 from .line_beam import BeamParts, bare_beam, parts_of, running_beam
 from .push import pushed_stations
 
-_CORNERED = 3  # times the nodes: with 48 a journal in an arc lies 12 % of the clearance too high
+_CORNER_NODES = 3  # factor: with 48 nodes a journal in an arc is 12 % of the clearance too high
 
 
 @lru_cache(maxsize=32)
 def _basis(parts: BeamParts, places: tuple[float, ...], limit_hz: float) -> FreeBasis:
-    """Kept as the beam is: its own modes do not know films, housings or speed."""
+    """Free basis of a beam, cached like the beam: independent of films, housings and speed."""
     forced = [*places, *(disc.station for disc in parts.discs), *parts.stations[-1:]]
     return free_basis(
         bare_beam(parts), limit_hz=limit_hz, stations=list(dict.fromkeys(forced)), slopes=True
@@ -34,13 +34,13 @@ def _basis(parts: BeamParts, places: tuple[float, ...], limit_hz: float) -> Free
 def film_bearings(
     scene: ShaftScene, moves: Mapping[str, float] | None = None
 ) -> tuple[FilmBearing, ...]:
-    """Bearings with their oil films, in the running state: hot, on the hull as it is.
+    """Bearings with their oil films in the running state: hot, on the deflected hull.
 
     Parameters
     ----------
     scene : ShaftScene
     moves : mapping of str to float, optional
-        Bearing -> by how much it is moved up [m].
+        Bearing -> upward displacement [m].
 
     Returns
     -------
@@ -86,7 +86,7 @@ def _film_bearing(
             viscosity=scene.oil.warmed(bearing.film_warming),
             film=FilmGeometry(
                 length_to_diameter=bearing.length / bearing.diameter,
-                n_theta=film.n_theta * (_CORNERED if _has_corners(bearing) else 1),
+                n_theta=film.n_theta * (_CORNER_NODES if _has_corners(bearing) else 1),
                 n_z=film.n_z,
                 condition=film.condition,
                 grooves=_side_grooves(bearing.groove_width),
@@ -113,7 +113,7 @@ def _has_corners(bearing: ShaftBearing) -> bool:
 
 
 def _side_grooves(width: float) -> tuple[Groove, ...]:
-    """Two through the whole length, a quarter of a turn from the bottom, without pressure."""
+    """Two grooves over the whole length, a quarter turn from the bottom, without pressure."""
     if width == 0:
         return ()
     sides = (-math.pi / 2, math.pi / 2)
@@ -122,14 +122,14 @@ def _side_grooves(width: float) -> tuple[Groove, ...]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShaftState:
-    """A line in steady running: at rest on its films, and ready to vibrate about that.
+    """A shaft line in steady running: its equilibrium on the films, and the rotor about it.
 
     Attributes
     ----------
     beam : Beam
-        With all steady loads.
+        Beam with all steady loads.
     film : BeamFilm
-        Where the journals are, and what the films carry.
+        Positions of the journals and loads of the films.
     rotor : Rotor
         The beam on the films' stiffness and damping, in housings on their pedestals.
     """
@@ -147,16 +147,16 @@ def shaft_state(
     *,
     raise_on_failure: bool = True,
 ) -> ShaftState:
-    """Beam and films solved together in the running state, and the rotor about it.
+    """Solve beam and films together in the running state, and build the rotor about it.
 
     Parameters
     ----------
     scene : ShaftScene
-        Of a propulsion shaft or a shaft rig.
+        A propulsion shaft or a shaft rig.
     moves : mapping of str to float, optional
-        Bearing -> by how much it is moved up [m].
+        Bearing -> upward displacement [m].
     raise_on_failure : bool
-        False returns the last state with its status instead.
+        False: return the last state with its status instead.
 
     Returns
     -------
@@ -166,9 +166,9 @@ def shaft_state(
     Raises
     ------
     ShaftFilmError
-        No balance was found; names the bearing and the cure.
+        No equilibrium was found; the message names the bearing and the cure.
     ValueError
-        The scene is no shaft line, a move names no bearing of it, or as :func:`shaft_beam`.
+        The scene is no shaft line, a move names no bearing of it, or as in :func:`shaft_beam`.
 
     Examples
     --------
@@ -220,13 +220,13 @@ def _rotor(scene: ShaftScene, beam: Beam, film: BeamFilm) -> Rotor:
 
 
 def reduced_rotor(scene: ShaftScene, state: ShaftState) -> ReducedRotor:
-    """The rotor of a state on the free modes of its shaft up to half the sample rate.
+    """Reduce the rotor of a state to free modes of its shaft up to half the sample rate.
 
     Parameters
     ----------
     scene : ShaftScene
     state : ShaftState
-        Of :func:`shaft_state`.
+        Result of :func:`shaft_state`.
 
     Returns
     -------

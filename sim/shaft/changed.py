@@ -1,10 +1,10 @@
-"""A shaft line changed a little: its films, its transfer functions, and their slopes.
+"""Small changes of a shaft line: its films, its transfer functions, and their derivatives.
 
-What may change is told bearing by bearing, as one row of numbers each; any unknown of a line is a
-sum of such rows. The shaft itself stays as it is, so that it is condensed to its bearings once for
+Changes are given as one row of numbers for each bearing; any unknown of a line is a sum of such
+rows. The shaft itself does not change, so that it is condensed to its bearings once for
 each frequency, free of all supports: films, housings and pedestals are joined to it afterwards, and
-the slope of a transfer function by anything in them is a product of two of its columns,
-``dH = -y' dZ x``.
+the derivative of a transfer function with respect to anything in them is a product of two of its
+columns, ``dH = -y' dZ x``.
 
 ==================  ======================================================================
 quantity            in a row
@@ -14,7 +14,7 @@ clearance           natural logarithm of a factor
 viscosity           natural logarithm of a factor
 pedestal            the same of the stiffness along y, z
 pedestal_damping    the same of the damping along y, z
-film_stiffness      4 x 4, added to the film's over its own size, see :func:`film_sizes`
+film_stiffness      4 x 4, added to the film's, in units of :func:`film_sizes`
 film_damping        the same
 ==================  ======================================================================
 """
@@ -52,10 +52,10 @@ _COLUMNS = {
 }
 
 QUANTITIES = tuple(_COLUMNS)
-"""What of a bearing may change."""
+"""Quantities of a bearing that may change."""
 
 WIDTH = 42
-"""Numbers of a bearing's row."""
+"""Length of a bearing's row."""
 
 _COORDINATES = ("y", "z", "slope_y", "slope_z")
 
@@ -69,18 +69,18 @@ def no_change(bearings: int) -> Vector:
 
 
 def unit_change(bearings: int, bearing: int, quantity: str, entry: int = 0) -> Vector:
-    """One number of one bearing changed by one.
+    """Change one number of one bearing by one.
 
     Parameters
     ----------
     bearings : int
-        Of the line.
+        Number of bearings of the line.
     bearing : int
-        Counted from aft.
+        Index of the bearing, from aft.
     quantity : str
         One of :data:`QUANTITIES`.
     entry : int
-        Of the quantity, matrices row by row.
+        Index in the quantity; matrices row by row.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def unit_change(bearings: int, bearing: int, quantity: str, entry: int = 0) -> V
 
 
 def part_of(change: Vector, quantity: str) -> Vector:
-    """A quantity of all bearings [shape=(..., n, size)]."""
+    """Select a quantity of all bearings [shape=(..., n, size)]."""
     return change[..., _COLUMNS[quantity]]
 
 
@@ -113,23 +113,23 @@ def part_of(change: Vector, quantity: str) -> Vector:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineModel:
-    """A shaft line as its transfer functions see it.
+    """A shaft line with the data for its transfer functions.
 
     Attributes
     ----------
     beam : Beam
-        With all steady loads.
+        Beam with all steady loads.
     bearings : tuple of FilmBearing
-        n of them, from aft.
+        n bearings, from aft.
     rung : str
-        Of the films.
+        Rung of the films.
     housing_masses : numpy.ndarray [shape=(n,)]
-        [kg]
+        Masses of the housings [kg].
     pedestals, pedestal_damping : numpy.ndarray [shape=(n, 2)]
-        Along y and z [N/m], [N s/m].
+        Stiffness and damping along y and z [N/m], [N s/m].
     damping_ratio : float
     damping_band : tuple of float, optional
-        Of the shaft's material, as :class:`.beam.rotor.Rotor` has them.
+        Damping of the shaft's material, as in :class:`.beam.rotor.Rotor`.
     """
 
     beam: Beam
@@ -143,11 +143,11 @@ class LineModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the bearings, from aft."""
+        """Names of the bearings, from aft."""
         return tuple(bearing.name for bearing in self.bearings)
 
     def changed(self, change: Vector) -> "LineModel":
-        """The line with its bearings changed; film coefficients are for :func:`transfer` to change.
+        """Line with changed bearings; changes of film coefficients are left to :func:`transfer`.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ def _changed(bearing: FilmBearing, row: Vector) -> FilmBearing:
 
 
 def line_model(scene: ShaftScene) -> LineModel:
-    """The line of a scene in its running state.
+    """Line of a scene in its running state.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def line_model(scene: ShaftScene) -> LineModel:
     Raises
     ------
     ValueError
-        As :func:`.line_beam.shaft_beam`.
+        As in :func:`.line_beam.shaft_beam`.
 
     Examples
     --------
@@ -218,15 +218,15 @@ def line_model(scene: ShaftScene) -> LineModel:
 
 
 def rest(model: LineModel, speed: float, *, start: BeamFilm | None = None) -> BeamFilm:
-    """Balance of the line on its films.
+    """Equilibrium of the line on its films.
 
     Parameters
     ----------
     model : LineModel
     speed : float
-        [rad/s]
+        Shaft speed [rad/s].
     start : BeamFilm, optional
-        Of a line nearby.
+        Equilibrium of a similar line.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def rest(model: LineModel, speed: float, *, start: BeamFilm | None = None) -> Be
     Raises
     ------
     ShaftFilmError
-        There is none.
+        There is no equilibrium.
     """
     return beam_film(
         model.beam,
@@ -248,7 +248,7 @@ def rest(model: LineModel, speed: float, *, start: BeamFilm | None = None) -> Be
 
 
 def film_sizes(film: BeamFilm) -> tuple[Vector, Vector]:
-    """What a film's stiffness and damping are measured by.
+    """Reference values of a film's stiffness and damping.
 
     Parameters
     ----------
@@ -257,8 +257,8 @@ def film_sizes(film: BeamFilm) -> tuple[Vector, Vector]:
     Returns
     -------
     stiffness, damping : numpy.ndarray [shape=(n, 4, 4)]
-        Root mean square of the four coefficients of y and z; with slopes times the length of the
-        bearing over the root of twelve, the lever of an even pressure.
+        Root mean square of the four coefficients of y and z; for slopes multiplied by the length of
+        the bearing over the root of twelve, the lever of a uniform pressure.
 
     Examples
     --------
@@ -283,17 +283,17 @@ def film_sizes(film: BeamFilm) -> tuple[Vector, Vector]:
 def coefficient_slopes(
     model: LineModel, film: BeamFilm, directions: Vector, *, step: float = GRADIENT_STEP
 ) -> tuple[Vector, Vector]:
-    """How stiffness and damping of the films follow changes of the line, to first order.
+    """Derivatives of the films' stiffness and damping for changes of the line.
 
     Parameters
     ----------
     model : LineModel
     film : BeamFilm
-        Its balance.
+        Equilibrium of the line.
     directions : numpy.ndarray [shape=(p, n, 42)]
-        Changes.
+        Changes of the line.
     step : float
-        As of :func:`.small_changes.coefficient_gradients`.
+        See :func:`.small_changes.coefficient_gradients`.
 
     Returns
     -------
@@ -301,9 +301,9 @@ def coefficient_slopes(
 
     Notes
     -----
-    A film's force is ``eta C^-2 r(u / C, u' L / C)``: its stiffness goes with the viscosity, with
-    the clearance to the power -3 where the journal keeps its place in the clearance, and with that
-    place.
+    A film's force is ``eta C^-2 r(u / C, u' L / C)``: its stiffness is proportional to the
+    viscosity, to the clearance to the power -3 for a fixed position in the clearance, and depends
+    on that position.
 
     Examples
     --------
@@ -332,11 +332,11 @@ def coefficient_slopes(
 
 
 def _shifts(model: LineModel, film: BeamFilm, directions: Vector) -> Vector:
-    """Of the journals in their bores (p, n, 4)."""
+    """Displacements of the journals in their bores (p, n, 4)."""
     push = np.concatenate([film.reactions, film.moments], axis=1)
     places = np.concatenate([film.positions, film.slopes], axis=1)
     clearance = part_of(directions, "clearance")
-    held = (clearance * places)[..., None]  # keeps the place in the clearance
+    held = (clearance * places)[..., None]  # keeps the position in the clearance
     forces = (part_of(directions, "viscosity") - 2 * clearance) * push
     forces += (film.stiffness @ held)[..., 0]
     bores = part_of(directions, "bore").copy()
@@ -351,18 +351,18 @@ def _shifts(model: LineModel, film: BeamFilm, directions: Vector) -> Vector:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeLine:
-    """A shaft without supports, seen from its bearings and where else something acts or is seen.
+    """A shaft without supports, condensed to its bearings and the places of forces and responses.
 
     Attributes
     ----------
     frequencies : numpy.ndarray [shape=(n_lines,)]
-        [Hz]
+        Frequencies [Hz].
     speed : float
-        [rad/s]
+        Shaft speed [rad/s].
     stiffness : numpy.ndarray [shape=(n_lines, m, m)]
-        Dynamic, force over displacement; four coordinates of each bearing first.
+        Dynamic stiffness, force over displacement; the four coordinates of each bearing come first.
     forces, responses : numpy.ndarray [shape=(n_force,)], [shape=(n_resp,)]
-        Coordinates, those of the housings behind the shaft's: y and z of each.
+        Coordinates; those of the housings, y and z of each, follow those of the shaft.
     """
 
     frequencies: Vector
@@ -372,7 +372,7 @@ class FreeLine:
     responses: NDArray[np.int64]
 
     def pushed(self, force: int) -> "FreeLine":
-        """The same with one of its forces alone."""
+        """The same with only one of its forces."""
         return replace(self, forces=self.forces[[force]])
 
 
@@ -384,15 +384,15 @@ def free_line(
     forces: Sequence[Place],
     responses: Sequence[Place],
 ) -> FreeLine:
-    """Condense the shaft for a test: once, whatever its bearings.
+    """Condense the shaft for a test: once for all changes of its bearings.
 
     Parameters
     ----------
     model : LineModel
     frequencies : array_like [shape=(n_lines,)]
-        > 0 [Hz].
+        Frequencies > 0 [Hz].
     speed : float
-        [rad/s]
+        Shaft speed [rad/s].
     forces, responses : sequence of place
         ``(bearing or station, coordinate)`` or ``(bearing, "y" or "z", "housing")``.
 
@@ -415,7 +415,7 @@ def free_line(
     """
     hertz = np.asarray(frequencies, dtype=float)
     if not (hertz > 0).all():
-        raise ValueError(f"frequency = {hertz.min():g} Hz must be > 0; nothing holds a free shaft")
+        raise ValueError(f"frequency = {hertz.min():g} Hz must be > 0; a free shaft has no support")
     shaft = Rotor(
         beam=model.beam, damping_ratio=model.damping_ratio, damping_band=model.damping_band
     )
@@ -434,7 +434,7 @@ def free_line(
 
 
 def _resolved(model: LineModel, shaft: Rotor, place: Place) -> tuple[int, bool]:
-    """Coordinate of the beam, or number among the housings', and whether it is one of these."""
+    """Coordinate of the beam, or index of a housing coordinate, and whether it is one of these."""
     if not isinstance(place, tuple):
         raise ValueError(f"place = {place!r} must be named, as ('stern', 'y', 'housing')")
     where, coordinate, *part = place
@@ -451,11 +451,11 @@ def _resolved(model: LineModel, shaft: Rotor, place: Place) -> tuple[int, bool]:
 
 
 class ChangedTransfer(NamedTuple):
-    """Accelerances, and what their slopes need."""
+    """Accelerances, and the data for their derivatives."""
 
     value: Complex  # [(m/s^2)/N] (n_lines, n_resp, n_force)
-    right: Complex  # displacement of every coordinate over each force (n_lines, m + 2 n, n_force)
-    left: Complex  # of every response over a force on every coordinate (n_lines, n_resp, m + 2 n)
+    right: Complex  # displacement of every coordinate per force (n_lines, m + 2 n, n_force)
+    left: Complex  # of every response per force on every coordinate (n_lines, n_resp, m + 2 n)
 
 
 def transfer(
@@ -467,11 +467,11 @@ def transfer(
     ----------
     model : LineModel
     film : BeamFilm
-        Its balance at the test's speed.
+        Equilibrium at the speed of the test.
     line : FreeLine
-        Of :func:`free_line`.
+        Result of :func:`free_line`.
     change : numpy.ndarray [shape=(n, 42)], optional
-        Of the film's coefficients alone; the rest of it is in the model.
+        Change of the film's coefficients only; other changes are in the model.
 
     Returns
     -------
@@ -537,22 +537,22 @@ def transfer_slopes(
     films: tuple[Vector, Vector],
     directions: Vector,
 ) -> Complex:
-    """How an accelerance follows changes of the line, to first order.
+    """Derivatives of an accelerance for changes of the line.
 
     Parameters
     ----------
     model : LineModel
     line : FreeLine
     found : Transfer
-        Of :func:`transfer`.
+        Result of :func:`transfer`.
     films : tuple of numpy.ndarray
-        Slopes of the films' coefficients, of :func:`coefficient_slopes` at the test's speed.
+        Derivatives of the films' coefficients from :func:`coefficient_slopes` at the test's speed.
     directions : numpy.ndarray [shape=(p, n, 42)]
 
     Returns
     -------
     numpy.ndarray [shape=(p, n_lines, n_resp, n_force)]
-        [(m/s^2)/N]
+        Derivatives [(m/s^2)/N].
 
     Examples
     --------
@@ -569,7 +569,7 @@ def transfer_slopes(
     m, n = line.stiffness.shape[1], len(model.bearings)
     right, housed = _parted(found.right.swapaxes(1, 2), m, n)
     left, seen = _parted(found.left, m, n)
-    # both halves of a product (n_lines, n_resp, n_force, n 4 4): all directions are then one more
+    # both factors of a product (n_lines, n_resp, n_force, n 4 4), computed once for all directions
     pairs = left[:, :, None, :, :, None] * right[:, None, :, :, None, :]
     pairs = pairs.reshape(*pairs.shape[:3], -1)
     turn = 1j * omega[:, None, None, None]
@@ -580,7 +580,7 @@ def transfer_slopes(
     damper = part_of(directions, "pedestal_damping") * model.pedestal_damping
     change += own @ spring.reshape(len(directions), -1).T
     change += turn * (own @ damper.reshape(len(directions), -1).T)
-    # of the accelerance's -w^2 and of dH = -y dZ x
+    # from the accelerance's -w^2 and dH = -y dZ x
     return np.asarray(np.moveaxis(omega[:, None, None, None] ** 2 * change, -1, 0))
 
 

@@ -1,4 +1,4 @@
-"""Elements of a shaft line: their lengths, and half a bending wave, which none may exceed."""
+"""Elements of a shaft line: their lengths, at most half a bending wave."""
 
 import math
 from itertools import accumulate, pairwise
@@ -10,7 +10,7 @@ from ..scene.shaft import ShaftScene
 
 
 def half_wave(scene: ShaftScene) -> float:
-    """Half a bending wave of the slimmest section at half of the sample rate [m].
+    """Half a bending wave of the slimmest section at half the sample rate [m].
 
     Examples
     --------
@@ -27,8 +27,8 @@ def half_wave(scene: ShaftScene) -> float:
 def element_lengths(scene: ShaftScene) -> list[float]:
     """Length of each element of a shaft's beam, from aft [m].
 
-    A node is at every end of a section, disc, load, bearing, support point and at the coupling;
-    between two of them elements are even.
+    There is a node at every end of a section, disc, load, bearing and support point, and at the
+    coupling; between two of them elements have equal lengths.
 
     Examples
     --------
@@ -54,11 +54,11 @@ def element_lengths(scene: ShaftScene) -> list[float]:
     return lengths
 
 
-_SAME_PLACE = 1e-9  # of the shaft's length, as the beam has it
+_SAME_PLACE = 1e-9  # of the shaft's length, as in the beam
 
 
 def element_faults(scene: Scene) -> list[str]:
-    """A mesh that has less than an element to a half-wave within the band of the recording.
+    """Find a mesh with less than one element per half-wave within the band of the recording.
 
     The frequency of a half-wave on one element is 11 % high.
 

@@ -1,4 +1,4 @@
-"""Forces that shake a line: unbalance, blade rate, coupling, turbulence; with the hull's."""
+"""Forces that excite a line: unbalance, blade rate, coupling, turbulence, and the hull's."""
 
 import math
 from typing import NamedTuple
@@ -15,11 +15,11 @@ from .line_beam import disc_of
 
 Float = NDArray[np.float64]
 
-_DENSITY_LINES = 200  # of a turbulence's spectrum up to half the sample rate
+_DENSITY_LINES = 200  # lines of a turbulence spectrum up to half the sample rate
 
 
 class OrderForce(NamedTuple):
-    """A force or moment that repeats with the shaft: ``Re(amplitude exp(j order angle))``."""
+    """A force or moment periodic with the shaft: ``Re(amplitude exp(j order angle))``."""
 
     order: int
     place: tuple[float, str]
@@ -27,7 +27,7 @@ class OrderForce(NamedTuple):
 
 
 def harmonic_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
-    """Unbalance, blade rate, coupling and hull of a scene, as seen from its first sample.
+    """Forces of unbalance, blade rate, coupling and hull, with phases at the first sample.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def harmonic_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
     Returns
     -------
     tuple of Harmonic
-        One for every order of the speed, rising; then those of
+        One for every order of the speed, in rising order; then those of
         :func:`~wearstate.sim.shaft.hull.hull_forces`.
 
     Examples
@@ -61,7 +61,7 @@ def harmonic_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
 
 
 def order_forces(scene: ShaftScene) -> list[OrderForce]:
-    """Of unbalance, blades and coupling, at the start angle zero; none without amplitude."""
+    """Forces of unbalance, blades and coupling at the start angle zero; zero amplitudes omitted."""
     forces = _unbalances(scene)
     if scene.propeller is not None:
         forces += _blade_rates(scene)
@@ -73,7 +73,7 @@ def order_forces(scene: ShaftScene) -> list[OrderForce]:
 def _forward(
     order: int, station: float, amplitude: complex, coordinates: tuple[str, str] = ("y", "z")
 ) -> list[OrderForce]:
-    """A vector that turns with the shaft: ``A (cos, sin)(order angle + phase)``."""
+    """A vector that rotates with the shaft: ``A (cos, sin)(order angle + phase)``."""
     return [
         OrderForce(order, (station, coordinate), amplitude * turn)
         for coordinate, turn in zip(coordinates, (1.0, -1j), strict=True)
@@ -112,7 +112,7 @@ def _blade_rates(scene: ShaftScene) -> list[OrderForce]:
 
 
 def coupling_forces(coupling: Coupling) -> list[OrderForce]:
-    """What a coupling with unlike elements does at once and twice the speed.
+    """Forces of a coupling with unequal elements at once and twice the speed.
 
     Parameters
     ----------
@@ -124,17 +124,17 @@ def coupling_forces(coupling: Coupling) -> list[OrderForce]:
 
     Notes
     -----
-    The elements stand on a ring at the angle ``psi = phi + theta``; their stiffness along it is
+    The elements are on a ring at the angle ``psi = phi + theta``; their stiffness along it is
     ``1 + a cos phi + b cos 2 phi`` over its mean, phi from the stiffest, theta the shaft's angle.
-    An offset delta, at rest in space, moves the element at psi by ``delta . t`` along the ring,
+    An offset delta, fixed in space, moves the element at psi by ``delta . t`` along the ring,
     ``t = (-sin psi, cos psi)``. The mean over the ring of ``2 k (1 + b cos 2 phi) (delta . t) t``
-    is the steady pull ``k delta`` and a force of ``k b delta / 2`` at twice the speed; an angle
-    does the same with its moments, of the other sign, as it moves the elements along the shaft. The
-    torque T winds up all elements alike, so that the stiffer side carries more of it and a force
-    of ``a T / 2 r`` turns with the shaft. An offset adds nothing at the speed itself: what stands
-    there besides unbalance is the torque's.
+    is the steady force ``k delta`` and a force of ``k b delta / 2`` at twice the speed; an angle
+    acts in the same way with its moments, of opposite sign, as it moves the elements along the
+    shaft. The torque T deforms all elements equally, so that the stiffer side carries more of it
+    and a force of ``a T / 2 r`` rotates with the shaft. An offset adds nothing at once the speed:
+    apart from unbalance, only the torque acts there.
 
-    Derived here. Measurements of misaligned couplings show mostly twice the speed, as here;
+    Derived here. Measurements of misaligned couplings show mainly twice the speed, as here;
     Sekhar, Prabhu (1995), Effects of coupling misalignment on vibrations of rotating machinery,
     Journal of Sound and Vibration 185(4), 655-671, doi:10.1006/jsvi.1995.0407, take both.
 
@@ -159,7 +159,7 @@ def coupling_forces(coupling: Coupling) -> list[OrderForce]:
 
 
 def random_forces(scene: ShaftScene) -> tuple[Broadband, ...]:
-    """Turbulence of a scene: two independent forces, up and to the side, of every entry.
+    """Turbulence of a scene: for every entry, two independent forces, up and to the side.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def random_forces(scene: ShaftScene) -> tuple[Broadband, ...]:
     Returns
     -------
     tuple of Broadband
-        With densities up to half the sample rate.
+        Densities reach up to half the sample rate.
 
     Examples
     --------
@@ -188,7 +188,7 @@ def random_forces(scene: ShaftScene) -> tuple[Broadband, ...]:
 
 
 def _pushed(scene: ShaftScene, name: str, axis: str) -> Place:
-    """Where a random force acts: the housing of a bearing, or the shaft at a disc."""
+    """Place of a random force: the housing of a bearing, or the shaft at a disc."""
     if name in [bearing.name for bearing in scene.bearings]:
         return name, axis, "housing"
     return disc_of(scene, name).station, axis
@@ -206,7 +206,7 @@ def turbulence_density(part: Turbulence, highest: float) -> tuple[Float, Float]:
     Returns
     -------
     frequencies : numpy.ndarray [shape=(n,)]
-        From zero, even below the corner and in even ratios above it [Hz].
+        From zero, linearly spaced below the corner and logarithmically above it [Hz].
     density : numpy.ndarray [shape=(n,)]
         ``2 F^2 / (pi f_c) / (1 + (f / f_c)^2)`` [N^2/Hz], whose integral to infinity is F^2.
 

@@ -1,8 +1,8 @@
-"""What the hull does to a line: it shakes the pedestals at the blade rate and at engines' orders.
+"""Effect of the hull on a line: it shakes the pedestals at the blade rate and at engine orders.
 
-A foundation that moves by s pushes the housing on its pedestal with ``k s + c s'``, as much as it
-pushes a housing at rest. That is all that the line feels of it, so that hull vibration is a
-harmonic force on every housing, exactly; films and shaft answer as to any other force.
+A foundation that moves by s exerts ``k s + c s'`` on the housing through its pedestal, the same as
+on a housing at rest. This is its only effect on the line, so that hull vibration is exactly a
+harmonic force on every housing; films and shaft respond as to any other force.
 """
 
 import cmath
@@ -16,7 +16,7 @@ from ..shaft_response.time_response import Harmonic
 
 
 def hull_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
-    """Forces of the hull's vibration on the housings, as seen from the first sample.
+    """Forces of the hull's vibration on the housings, with phases at the first sample.
 
     Parameters
     ----------
@@ -25,13 +25,13 @@ def hull_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
     Returns
     -------
     tuple of Harmonic
-        Those of the blade rate, which keep in step with the shaft, then those of the engines; of
-        tones without velocity none.
+        Those of the blade rate, in phase with the shaft, then those of the engines; tones without
+        velocity are omitted.
 
     Notes
     -----
     A tone of the complex velocity V at the angular frequency w moves the foundation of a share h by
-    ``h V / (i w)`` and pushes its housing with ``(k + i w c) h V / (i w)``.
+    ``h V / (i w)`` and exerts ``(k + i w c) h V / (i w)`` on its housing.
 
     Examples
     --------
@@ -51,7 +51,7 @@ def hull_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
 
 
 def hull_orders(scene: ShaftScene) -> tuple[int, ...]:
-    """Orders of the shaft's speed at which the hull shakes.
+    """Orders of the shaft's speed at which the hull vibrates.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def hull_orders(scene: ShaftScene) -> tuple[int, ...]:
 
 
 def engine_rate_faults(scene: ShaftScene) -> list[str]:
-    """Tones of engines that the sample rate cannot hold, as sentences."""
+    """Engine tones at or above half the sample rate, as sentences."""
     return [
         f"hull.engines.{i}.tones.{k}: order {tone.order:g} of {engine.speed:g} Hz = "
         f"{tone.order * engine.speed:g} Hz must be < half of sample_rate = "
@@ -91,7 +91,7 @@ def _tones(scene: ShaftScene) -> Iterator[tuple[float, float, HullBladeTone | En
 def _pushed(
     scene: ShaftScene, hertz: float, start: float, tone: HullBladeTone | EngineTone
 ) -> dict[Place, complex]:
-    """Amplitudes of the forces of a tone on the housings [N]."""
+    """Amplitudes of a tone's forces on the housings [N]."""
     up, side = (
         velocity * cmath.exp(1j * (start + phase))
         for velocity, phase in ((tone.up, tone.up_phase), (tone.side, tone.side_phase))
@@ -105,7 +105,7 @@ def _pushed(
 
 
 def _over_velocity(housing: Housing, omega: float) -> tuple[complex, complex]:
-    """Force on a housing over the hull's velocity, up and to the side [N s/m]."""
+    """Force on a housing per velocity of the hull, up and to the side [N s/m]."""
     return (
         housing.hull_share_up * complex(housing.damping_up, -housing.stiffness_up / omega),
         housing.hull_share_side * complex(housing.damping_side, -housing.stiffness_side / omega),

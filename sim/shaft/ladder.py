@@ -1,4 +1,4 @@
-"""Rungs of a propulsion shaft, from the cheapest to the best, and what a run of it costs."""
+"""Rungs of a propulsion shaft, from the cheapest to the best, and the cost of a run."""
 
 import math
 from collections.abc import Iterator
@@ -54,10 +54,10 @@ def _mesh_effect(scene: Scene) -> Iterator[Effect]:
 
 
 def _line_meshes(film: Film) -> Iterator[Rung]:
-    """Levels, and between two of them the mesh that is finer round the bore alone.
+    """Mesh levels, and between two of them a mesh that is finer only round the bore.
 
-    A line solves its films some hundred times, not thousands of times as an orbit does: a solve's
-    time goes with the nodes round the bore, and with the cube of those along it.
+    A line solves its films some hundred times, not thousands of times like an orbit. The time of a
+    solve is proportional to the nodes round the bore, and to the cube of those along it.
     """
     for factor in STEP_LEVELS:
         yield from levels("a mesh width of the film", [factor], partial(mesh_values, film))
@@ -65,7 +65,7 @@ def _line_meshes(film: Film) -> Iterator[Rung]:
         if values is not None:
             yield Rung(
                 name=f"{level_name(factor / 2)} round",
-                assumes=f"a mesh width of the film of {factor / 2:g} times what is written round "
+                assumes=f"a mesh width of the film of {factor / 2:g} times the scene's value round "
                 f"the bore, {factor:g} times along it",
                 values=values,
             )
@@ -88,28 +88,28 @@ def _element_effect(scene: Scene) -> Iterator[Effect]:
 
 # --- cost
 
-_BAND = 0.5  # of a tabulated solve that is neither symmetric nor starts from the last
+_BAND = 0.5  # of a tabulated solve that is not symmetric and does not start from the last one
 
-_BALANCE = 150  # orbit's solves that balancing each bearing takes: tilted, from cold, coefficients
+_BALANCE = 150  # orbit solves per bearing for the equilibrium: tilted, from cold, with coefficients
 
-_ELEMENT = 100_000.0  # ns of one element: matrices, balance
+_ELEMENT = 100_000.0  # ns per element: matrices, equilibrium
 
-_STATES = 1.5  # ns of a cubed state: eigenvectors
+_STATES = 1.5  # ns per state cubed: eigenvectors
 
-_FORCE = 1_000_000.0  # ns of one random force: its receptance
+_FORCE = 1_000_000.0  # ns per random force: its receptance
 
-_FORCE_SAMPLE = 180.0  # ns of one sample of one random force
+_FORCE_SAMPLE = 180.0  # ns per sample of a random force
 
-_CHANNEL = 120.0  # ns of one sample of one channel
+_CHANNEL = 120.0  # ns per sample of a channel
 
-_LINE = 10_000_000.0  # ns of a recording beside
+_LINE = 10_000_000.0  # ns of a recording in addition
 
 
 def shaft_states(scene: ShaftScene) -> int:
-    """States of a line's modes that a recording is expected to take.
+    """Expected number of states of a line's modes in a recording.
 
-    Free modes up to half of the sample rate, two residual shapes for each place that is pushed,
-    in two planes; the housings.
+    Free modes up to half the sample rate and two residual shapes for each place of a force, each
+    in two planes; and the housings.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A line as an alignment calculation sees it: seats, conditions, the hull's shape."""
+"""Alignment model of a line: seats, conditions, the hull's shape."""
 
 from ..alignment.alignment import AlignmentLine, Condition
 from ..scene.shaft import ShaftScene
@@ -7,23 +7,23 @@ from .line_beam import seat_of, shaft_beam, thrust_loads
 
 
 def alignment_line(scene: ShaftScene) -> AlignmentLine:
-    """The line as an alignment calculation sees it: the beam on elastic, unilateral seats.
+    """Alignment model of a line: the beam on elastic, unilateral seats.
 
     Parameters
     ----------
     scene : ShaftScene
-        Of a propulsion shaft or a shaft rig.
+        A propulsion shaft or a shaft rig.
 
     Returns
     -------
     AlignmentLine
-        Offsets as aligned, less sag and wear-down; no thermal rise, no hull deflection: these are
-        of a condition.
+        Offsets as aligned, less sag and wear-down; without thermal rise and hull deflection, which
+        belong to a condition.
 
     Raises
     ------
     ValueError
-        As :func:`shaft_beam`.
+        As in :func:`shaft_beam`.
 
     Examples
     --------
@@ -38,12 +38,12 @@ def alignment_line(scene: ShaftScene) -> AlignmentLine:
 
 
 def alignment_conditions(scene: ShaftScene) -> dict[str, Condition]:
-    """The states in which the alignment must be within its limits.
+    """States in which the alignment must be within its limits.
 
     Parameters
     ----------
     scene : ShaftScene
-        Of a propulsion shaft or a shaft rig.
+        A propulsion shaft or a shaft rig.
 
     Returns
     -------
@@ -80,23 +80,23 @@ def _condition(scene: ShaftScene, name: str, part: ShaftCondition) -> Condition:
 
 
 def hull_deflection(scene: ShaftScene, part: ShaftCondition) -> float:
-    """Of the condition, or the hull's own [m]."""
+    """Hull deflection of the condition, by default the hull's own [m]."""
     return scene.hull.deflection if part.hull_deflection is None else part.hull_deflection
 
 
 def hull_shape(scene: ShaftScene, station: float) -> tuple[float, float]:
-    """Height and slope of the hull where its middle has risen by one.
+    """Height and slope of the hull for a rise of its middle by one.
 
     Parameters
     ----------
     scene : ShaftScene
     station : float
-        [m]
+        Distance from the aft end [m].
 
     Returns
     -------
     height : float
-        Over that of the middle: a parabola, zero at the first and at the last bearing [-].
+        Over the height of the middle: a parabola, zero at the first and at the last bearing [-].
     slope : float
         Over the height of the middle [1/m].
 

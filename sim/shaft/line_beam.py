@@ -1,4 +1,4 @@
-"""Beam of a line from its scene: sections, discs, and the loads that are always there."""
+"""Beam of a line from its scene: sections, discs, and permanent loads."""
 
 import math
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ from .push import pushed_stations
 
 
 def shaft_beam(scene: ShaftScene) -> Beam:
-    """Beam of a scene with the loads that are always there: weight, loads, coupling.
+    """Beam of a scene with its permanent loads: weight, loads, coupling.
 
     Parameters
     ----------
     scene : ShaftScene
-        Of a propulsion shaft or a shaft rig.
+        A propulsion shaft or a shaft rig.
 
     Returns
     -------
@@ -30,7 +30,7 @@ def shaft_beam(scene: ShaftScene) -> Beam:
     Raises
     ------
     ValueError
-        Two of these stations are too near to each other.
+        Two of these stations are too close to each other.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def shaft_beam(scene: ShaftScene) -> Beam:
 
 
 def running_beam(scene: ShaftScene) -> Beam:
-    """Beam of a scene in steady running: with its thrust as well.
+    """Beam of a scene in steady running, which includes the thrust.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def running_beam(scene: ShaftScene) -> Beam:
 
 
 class BeamParts(NamedTuple):
-    """What a beam is made of; machines and records that share it share the beam."""
+    """Components of a beam; machines and records with equal components share the beam."""
 
     sections: tuple[Section, ...]
     discs: tuple[Disc, ...]
@@ -66,7 +66,7 @@ class BeamParts(NamedTuple):
 
 
 def parts_of(scene: ShaftScene) -> BeamParts:
-    """Of a scene, without what machines of one kind differ in."""
+    """Beam components of a scene, without properties in which similar machines differ."""
     coupling = (scene.coupling.station,) if scene.coupling else ()
     return BeamParts(
         sections=_sections(scene),
@@ -83,7 +83,7 @@ def parts_of(scene: ShaftScene) -> BeamParts:
 
 
 def _own_stations(scene: ShaftScene) -> tuple[float, ...]:
-    """Stations where an exciter pushes and no part of the line is."""
+    """Stations of exciters where no other part of the line is."""
     parts = {bearing.station for bearing in scene.bearings}
     parts |= {disc.station for disc in scene.discs}
     parts |= {scene.coupling.station} if scene.coupling else set()
@@ -106,7 +106,7 @@ def _sections(scene: ShaftScene) -> tuple[Section, ...]:
 
 
 def _disc(part: ShaftDisc) -> Disc:
-    """Without its unbalance, so that machines that differ in it alone share a beam."""
+    """Disc without its unbalance, so that machines that differ only in that share a beam."""
     return Disc(
         station=part.station,
         mass=part.mass,
@@ -131,7 +131,7 @@ def _load(part: ShaftLoad) -> PointLoad:
 
 @lru_cache(maxsize=32)
 def bare_beam(parts: BeamParts) -> Beam:
-    """Kept between the records of a data set, which differ in bearings and forces."""
+    """Beam without supports, cached for the records of a data set, which share it."""
     material = parts.material
     timoshenko = material.theory == "timoshenko"
     return assemble_beam(
@@ -147,7 +147,7 @@ def bare_beam(parts: BeamParts) -> Beam:
 
 
 def _loaded(beam: Beam, loads: Sequence[PointLoad]) -> Beam:
-    """The same beam with further steady loads at its nodes."""
+    """The same beam with additional steady loads at its nodes."""
     steady = beam.load.copy()
     for load in loads:
         first = beam.dof(load.station, "y")
@@ -162,7 +162,7 @@ def thrust_loads(scene: ShaftScene, share: float = 1.0) -> tuple[PointLoad, ...]
     ----------
     scene : ShaftScene
     share : float
-        Of the thrust.
+        Share of the thrust.
 
     Returns
     -------
@@ -171,8 +171,8 @@ def thrust_loads(scene: ShaftScene, share: float = 1.0) -> tuple[PointLoad, ...]
 
     Notes
     -----
-    A force T along x at the height e turns the slope dy/dx by the moment ``-T e``: above the axis
-    it lifts the propeller.
+    A force T along x at the height e acts on the slope dy/dx with the moment ``-T e``: above the
+    axis it lifts the propeller.
 
     Examples
     --------
@@ -193,12 +193,12 @@ def thrust_loads(scene: ShaftScene, share: float = 1.0) -> tuple[PointLoad, ...]
 
 
 def disc_of(scene: ShaftScene, name: str) -> ShaftDisc:
-    """By its name."""
+    """Return the disc of that name."""
     return next(disc for disc in scene.discs if disc.name == name)
 
 
 def seat_of(bearing: ShaftBearing) -> Seat:
-    """A bearing as an alignment calculation sees it."""
+    """Seat of a bearing in the alignment model."""
     limits = bearing.limits
     return Seat(
         name=bearing.name,
@@ -218,7 +218,7 @@ def seat_of(bearing: ShaftBearing) -> Seat:
 
 
 def coupling_loads(coupling: Coupling | None) -> tuple[PointLoad, ...]:
-    """What a misaligned coupling does to the shaft at rest.
+    """Loads of a misaligned coupling on the shaft at rest.
 
     Parameters
     ----------
@@ -227,15 +227,15 @@ def coupling_loads(coupling: Coupling | None) -> tuple[PointLoad, ...]:
     Returns
     -------
     tuple of PointLoad
-        One, at the coupling; none without.
+        One, at the coupling; none without a coupling.
 
     Notes
     -----
     A flexible ring pulls the shaft towards the axis of the other half with the force ``k delta``
     and turns it towards its direction with the moment ``k_b alpha``; the torque T that bends round
     the angle leaves ``T alpha / 2`` across it. The shaft's own displacement, hundredths of a
-    millimetre, is left out beside the offset, and with it the ring's stiffness in the line: it is
-    a hundredth of that of a bearing.
+    millimetre, is neglected against the offset, and so is the ring's stiffness in the line, a
+    hundredth of a bearing's.
 
     References
     ----------

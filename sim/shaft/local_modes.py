@@ -1,7 +1,7 @@
-"""What an accelerometer hears of the part of a housing that it sits on.
+"""Local vibration of the part of a housing that an accelerometer sits on.
 
-A scene's housing is one mass on its pedestal. A real one has webs, caps and covers that swing in
-it, from twice the pedestal's frequency on; they are too light to push back.
+A scene's housing is one mass on its pedestal. A real one has webs, caps and covers with their own
+modes, from twice the pedestal's frequency on; they are too light to act back.
 """
 
 import math
@@ -16,42 +16,44 @@ from ..scene.shaft_parts import LocalMode
 Float = NDArray[np.float64]
 
 _SETTLED = math.log(1e4)
-"""Time constants after which a motion from rest is the settled one to 1e-4."""
+"""Time constants after which a motion from rest has settled to 1e-4."""
 
 
-def heard_locally(acceleration: Float, modes: Sequence[LocalMode], sample_rate: float) -> Float:
+def local_acceleration(
+    acceleration: Float, modes: Sequence[LocalMode], sample_rate: float
+) -> Float:
     """Acceleration under a sensor, from that of its housing.
 
     Parameters
     ----------
     acceleration : numpy.ndarray [shape=(n_samples,)]
-        Of the housing [m/s^2].
+        Acceleration of the housing [m/s^2].
     modes : sequence of LocalMode
-        Of the part that the sensor sits on.
+        Modes of the part that the sensor sits on.
     sample_rate : float
-        [Hz]
+        Sampling rate [Hz].
 
     Returns
     -------
     numpy.ndarray [shape=(n_samples,)]
-        [m/s^2]
+        Acceleration under the sensor [m/s^2].
 
     Notes
     -----
-    Within a housing of the acceleration a, a light part moves by
+    Within a housing of acceleration a, a light part moves by
 
         z'' + 2 zeta w z' + w^2 z = -a,
 
-    and the sensor hears ``a + share z''`` of each: nothing more far below w, ``1 - share`` of a far
-    above. Exact at every frequency. What was before the recording is taken to be its own
-    reflection, long enough for the mode to settle: the first moments are those of another past
-    that is as loud.
+    and the sensor measures ``a + share z''`` of each: a far below w, ``1 - share`` of a far
+    above. Exact at every frequency. The time before the recording is replaced by its
+    reflection, long enough for the mode to settle: the first moments then have another
+    past of the same level.
 
     Examples
     --------
     >>> shake = np.cos(2 * np.pi * 50 * np.arange(2000) / 1000)
     >>> cap = LocalMode(frequency=100.0, damping_ratio=0.05, share=0.3)
-    >>> heard = heard_locally(shake, [cap], 1000.0)
+    >>> heard = local_acceleration(shake, [cap], 1000.0)
     >>> round(float(heard[500:1500].max()), 2)  # 1 + 0.3 / (2^2 - 1)
     1.1
     """
@@ -68,6 +70,6 @@ def heard_locally(acceleration: Float, modes: Sequence[LocalMode], sample_rate: 
 
 
 def _relative(mode: LocalMode, hertz: Float) -> NDArray[np.complex128]:
-    """Acceleration of a part within its housing over that of the housing."""
+    """Acceleration of a part relative to its housing, over that of the housing."""
     own, drag = mode.frequency**2, 2j * mode.damping_ratio * mode.frequency
     return np.asarray(hertz**2 / (own - hertz**2 + drag * hertz), dtype=np.complex128)

@@ -1,6 +1,6 @@
-"""What shakers and hammers do to a running shaft line, added to its own vibration.
+"""Effect of shakers and hammers on a running shaft line, added to its other vibration.
 
-The response is the linear one about the state of rest on the films, as that of every other force.
+The response is linear about the equilibrium on the films, as for every other force.
 """
 
 import math
@@ -18,17 +18,17 @@ from ..shaft_response.time_response import Transient, time_response
 
 Float = NDArray[np.float64]
 _SETTLED = math.log(1e4)
-"""Time constants after which a motion from rest is the settled one to 1e-4."""
+"""Time constants after which a motion from rest has settled to 1e-4."""
 
-_BAND_LINES = 512  # of a band in which the largest motion is looked for
-_PEAK = 4.0  # of the rms of a Gaussian motion: passed once in 16,000 independent values
-_HARDEST = 2.33  # deviations of the logarithm of a peak: one blow in a hundred is harder
-_TAIL = 64  # samples after the recording in which a steady force fades away
+_BAND_LINES = 512  # frequencies at which the largest motion within a band is searched
+_PEAK = 4.0  # of the rms of a Gaussian motion: exceeded once in 16,000 independent values
+_HARDEST = 2.33  # standard deviations of the logarithm of a peak: exceeded by one blow in a hundred
+_TAIL = 64  # samples after the recording in which a steady force is faded out
 _AXES = {"up": "y", "side": "z"}
 
 
 def pushed_stations(scene: ShaftScene) -> tuple[float, ...]:
-    """Stations of the shaft itself where an exciter pushes [m].
+    """Stations of the shaft where an exciter acts [m].
 
     Examples
     --------
@@ -53,7 +53,7 @@ def _place(scene: ShaftScene, part: ShaftExciter, axis: str = "") -> tuple[float
 
 
 def exciter_places(scene: ShaftScene) -> tuple[Place, ...]:
-    """Where the mounted exciters push, as transfer functions name it.
+    """Places of the mounted exciters, as named by transfer functions.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def exciter_places(scene: ShaftScene) -> tuple[Place, ...]:
 
 
 def exciter_place(scene: ShaftScene, part: ShaftExciter) -> Place:
-    """Where one exciter pushes, mounted or not, as transfer functions name it."""
+    """Place of an exciter, mounted or not, as named by transfer functions."""
     return _full(part, _place(scene, part))
 
 
@@ -100,7 +100,7 @@ def pushes(scene: ShaftScene, seed: int, lead: int = 0) -> tuple[Push, ...]:
 
 
 def lead_samples(scene: ShaftScene, reduced: ReducedRotor) -> int:
-    """Samples in which the slowest motion of a line settles, at most those of the recording."""
+    """Samples in which the slowest motion of a line settles, at most the recording's length."""
     longest = round(scene.duration * scene.sample_rate)
     slowest = -float(reduced.poles.real.max())
     return min(longest, math.ceil(_SETTLED / slowest * scene.sample_rate))
@@ -114,24 +114,24 @@ def pushed_motion(
     *,
     lead: int,
 ) -> Float:
-    """Motion under the forces of all exciters together.
+    """Motion under the forces of all exciters.
 
     Parameters
     ----------
     scene : ShaftScene
     reduced : ReducedRotor
-        Of its state.
+        Rotor of the scene's state.
     found : sequence of Push
-        Of `pushes`, with the same lead.
+        Result of `pushes`, with the same lead.
     responses : sequence of tuple
-        Place and quantity.
+        Place and quantity of each response.
     lead : int
-        Samples that are left out at the begin.
+        Number of initial samples to omit.
 
     Returns
     -------
     ndarray, shape (n_resp, n_samples)
-        In SI.
+        Motion in SI.
     """
     transients = [
         transient
@@ -159,24 +159,24 @@ def _transients(scene: ShaftScene, part: ShaftExciter, push: Push) -> Iterator[T
             yield Transient(samples=samples, forces={place: 1.0})
 
 
-# --- how far it moves the journals
+# --- motion of the journals
 
 
 def peak_push(scene: ShaftScene, reduced: ReducedRotor, places: Sequence[Place]) -> Float:
-    """Largest displacements that the exciters can be expected to make, added.
+    """Largest expected displacements from the exciters, summed.
 
     Parameters
     ----------
     scene : ShaftScene
     reduced : ReducedRotor
     places : sequence of place
-        Pairs of which the motion of the second is taken from that of the first: a journal up, its
-        housing up, and so on.
+        Pairs of places, of which the motion of the second is subtracted from the first: a journal
+        up, its housing up, and so on.
 
     Returns
     -------
     ndarray, shape (n_places / 2,)
-        Four times the rms under a random force, the largest steady amplitude under a sweep or
+        Four times the rms for a random force, the largest steady amplitude for a sweep or
         stepped sine, the peak after the hardest blow of a hundred and its rebound [m].
     """
     total = np.zeros(len(places) // 2)

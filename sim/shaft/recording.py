@@ -1,7 +1,7 @@
 """Recording of a propulsion shaft.
 
-The state of rest is that of beam and oil films solved together; what the sensors see is the linear
-response about it, in steady running. Axes are those of
+The equilibrium is that of beam and oil films solved together; the sensors measure the linear
+response about it, in steady running. For the axes see
 :mod:`wearstate.sim.shaft_films.on_oil_films`.
 """
 
@@ -33,7 +33,7 @@ from .elements import element_faults
 from .forces import harmonic_forces, order_forces, random_forces
 from .hull import engine_rate_faults, hull_orders
 from .line_alignment import alignment_line
-from .local_modes import heard_locally
+from .local_modes import local_acceleration
 from .push import lead_samples, peak_push, pushed_motion, pushes
 
 Float = NDArray[np.float64]
@@ -41,19 +41,19 @@ Float = NDArray[np.float64]
 Numerics = dict[str, float | int | str]
 
 _FEWEST_PER_TURN = 8
-"""Samples a revolution: three orders below half the sample rate, and a margin."""
+"""Samples per revolution: three orders below half the sample rate, and a margin."""
 
 _BYTES_PER_SAMPLE = 200 * 8  # spectra of forces, states of a block, responses, channels
 
 _MOVED_WARNING = 0.3
 """Peak motion over the least film at which the films' stiffness has changed by about its own size,
-``(1 + 0.3)^3`` to one, and the linear response is a fair guess no more."""
+``(1 + 0.3)^3`` to one, and the linear response is no longer a fair estimate."""
 _RESONANT = 0.1
-"""Damping ratio below which a motion is called a resonance: amplified five times and more."""
+"""Damping ratio below which a mode counts as a resonance: amplified at least five times."""
 
-_PEAK = 4.0  # of the rms of a Gaussian motion: passed once in 16,000 independent values
-_LIFTED = 0.05  # of the mean reaction: a bearing that carries less is told of
-_THIN_EDGE = 0.2  # least film over that without tilt: below it the edge is what runs
+_PEAK = 4.0  # of the rms of a Gaussian motion: exceeded once in 16,000 independent values
+_LIFTED = 0.05  # of the mean reaction: a warning is given for a bearing that carries less
+_THIN_EDGE = 0.2  # least film over that without tilt: below it the journal runs on its edge
 
 _STATUS = {
     ShaftFilmStatus.OK: Status.OK,
@@ -63,16 +63,16 @@ _STATUS = {
     ShaftFilmStatus.NO_CONVERGENCE: Status.LINE_BALANCE,
     ShaftFilmStatus.COARSE: Status.LINE_COARSE,
 }
-"""How the balance of shaft and films ended, in the words of a scene."""
+"""Status of a scene's run by that of its equilibrium."""
 
 
 def check_shaft(scene: Scene) -> None:
-    """Check what only the physics can tell: sampling, size, the beam's mesh.
+    """Check sampling, size and the beam's mesh, which need the physics.
 
     Raises
     ------
     SceneError
-        Every fault at once.
+        All faults together.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def _sampling_faults(scene: ShaftScene) -> list[str]:
 
 
 class _Rest(NamedTuple):
-    """A line at rest and judged: what recordings share that differ in seed and start angle."""
+    """Equilibrium of a line with its status, for recordings of any seed and start angle."""
 
     state: ShaftState
     reduced: ReducedRotor | None
@@ -122,7 +122,7 @@ def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool)
 
 
 def shaft_recorder(scene: Scene) -> Recorder:
-    """Recordings of one line at rest; see :func:`wearstate.sim.machine.simulate.recorder`."""
+    """Simulator for one line; see :func:`wearstate.sim.machine.simulate.recorder`."""
     return partial(_record, _rest(cast(ShaftScene, scene)))
 
 
@@ -135,7 +135,7 @@ def _rest(scene: ShaftScene) -> _Rest:
     if status.ok:
         reduced = reduced_rotor(scene, state)
         numerics |= _guards(scene, reduced)
-        status, culprit = _judged(scene, state, reduced, numerics)
+        status, culprit = _motion_status(scene, state, reduced, numerics)
     return _Rest(state, reduced, status, culprit, numerics)
 
 
@@ -159,7 +159,7 @@ def _record(rest: _Rest, scene: Scene, seed: int, truth: bool, raise_on_failure:
 
 
 def _guards(scene: ShaftScene, reduced: ReducedRotor) -> Numerics:
-    """Least damping, which is how far the line is from unstable; first resonance; basis' error."""
+    """Least damping, which is the stability margin; first resonance; error of the basis."""
     swinging = reduced.poles[np.abs(reduced.poles.imag) > 0]
     ratios = -swinging.real / np.abs(swinging)
     least = int(np.argmin(ratios))
@@ -180,10 +180,10 @@ def _guards(scene: ShaftScene, reduced: ReducedRotor) -> Numerics:
     return guards
 
 
-def _judged(
+def _motion_status(
     scene: ShaftScene, state: ShaftState, reduced: ReducedRotor, numerics: Numerics
 ) -> tuple[Status, str]:
-    """Whether the linear response holds, and the bearing that says so."""
+    """Status of the linear response, and the bearing that limits it."""
     if not reduced.stable:
         worst = int(np.argmin(state.film.reactions[:, 1] ** 2 + state.film.reactions[:, 0] ** 2))
         return Status.LINE_UNSTABLE, scene.bearings[worst].name
@@ -195,20 +195,20 @@ def _judged(
 
 
 def peak_motion(scene: ShaftScene, reduced: ReducedRotor) -> Float:
-    """How far each journal moves in its bore, by the linear response.
+    """Peak motion of each journal in its bore, by the linear response.
 
     Parameters
     ----------
     scene : ShaftScene
     reduced : ReducedRotor
-        Of its state.
+        Rotor of the scene's state.
 
     Returns
     -------
     numpy.ndarray [shape=(n,)]
         Sum of the amplitudes of all orders, and four times the rms of the random motion, each
-        over both directions together, and what exciters add by
-        :func:`~wearstate.sim.shaft.push.peak_push`: an upper bound but for some rare peaks [m].
+        over both directions together, plus the exciters' part by
+        :func:`~wearstate.sim.shaft.push.peak_push`: an upper bound except for rare peaks [m].
 
     Examples
     --------
@@ -223,7 +223,7 @@ def peak_motion(scene: ShaftScene, reduced: ReducedRotor) -> Float:
     square = np.zeros(phasors.shape[1:])
     for force in random_forces(scene):
         hertz, density = np.asarray(force.frequencies), np.asarray(force.density)
-        # the mean leaves the rigid motion at rest out of it, as the response does
+        # without the mean, which excludes the rigid motion at rest like the response does
         gain = reduced.receptance(hertz[1:], places, list(force.forces))[..., 0]
         square += np.trapezoid(
             np.abs(_relative(gain, axis=1)) ** 2 * density[1:, None, None], hertz[1:], axis=0
@@ -246,14 +246,14 @@ def _bore_places(scene: ShaftScene) -> list[Place]:
 
 
 def _paired(places: Sequence[Place]) -> list[Place]:
-    """Journal and housing of one direction side by side."""
+    """Journal and housing of one direction in pairs."""
     return [
         places[4 * i + j + 2 * k] for i in range(len(places) // 4) for j in (0, 1) for k in (0, 1)
     ]
 
 
 def _relative(values: NDArray[np.inexact], axis: int) -> NDArray[np.inexact]:
-    """Journal less housing; the axis of the places becomes two, bearing and direction."""
+    """Journal minus housing; the axis of the places becomes two, bearing and direction."""
     shape = values.shape
     split = values.reshape(*shape[:axis], shape[axis] // 4, 2, 2, *shape[axis + 1 :])
     journal, housing = np.moveaxis(split, axis + 1, 0)
@@ -261,7 +261,7 @@ def _relative(values: NDArray[np.inexact], axis: int) -> NDArray[np.inexact]:
 
 
 class _Motion:
-    """Time histories of the housings and journals that are seen, or of all."""
+    """Time histories of the housings and journals that sensors measure, or of all."""
 
     def __init__(
         self, scene: ShaftScene, state: ShaftState, reduced: ReducedRotor, seed: int, truth: bool
@@ -288,11 +288,11 @@ class _Motion:
         self._rows = dict(zip(wanted, found, strict=True))
 
     def acceleration(self, bearing: str, axis: str) -> Float:
-        """Of a housing [m/s^2]."""
+        """Acceleration of a housing [m/s^2]."""
         return np.asarray(self._rows[(bearing, axis, "housing"), "acceleration"])
 
     def offset(self, bearing: str, axis: str, quantity: str = "displacement") -> Float:
-        """Of a journal in its bore about its place at rest [m] or [m/s]."""
+        """Motion of a journal in its bore about its position at rest [m] or [m/s]."""
         journal, housing = (
             self._rows[(bearing, axis, part), quantity] for part in ("shaft", "housing")
         )
@@ -330,7 +330,7 @@ class _Motion:
 
 
 def _wanted(scene: ShaftScene, truth: bool) -> list[tuple[Place, str]]:
-    """Places and quantities of a run: those of the sensors, or of the truth as well."""
+    """Places and quantities of a run: those of the sensors, with truth all others too."""
     wanted: dict[tuple[Place, str], None] = {}
     for sensor in scene.sensors:
         axis = "y" if sensor.direction == "up" else "z"
@@ -364,13 +364,13 @@ def shaft_angle(scene: ShaftScene) -> Float:
 def _measured(
     scene: ShaftScene, state: ShaftState, motion: _Motion, seed: int
 ) -> tuple[NDArray[np.float32], int]:
-    """Signal of every channel, and how many samples were clipped."""
-    # apart from the stream of the random forces, which has the seed itself
+    """Signal of every channel, and the number of clipped samples."""
+    # separate from the stream of the random forces, which uses the seed itself
     rng = np.random.default_rng([seed, 1])
     angle = shaft_angle(scene)
     rows, clipped = [], 0
     readings = [
-        heard_locally(
+        local_acceleration(
             motion.acceleration(sensor.bearing, "y" if sensor.direction == "up" else "z"),
             sensor.modes,
             scene.sample_rate,
@@ -402,7 +402,7 @@ def _measured(
 def _reading(
     scene: ShaftScene, state: ShaftState, motion: _Motion, probe: ShaftProbe, angle: Float
 ) -> Float:
-    """Of a proximity probe: the journal from the middle of the bore as new, and its track."""
+    """Reading of a proximity probe: the journal from the middle of the new bore, plus run-out."""
     i = [bearing.name for bearing in scene.bearings].index(probe.bearing)
     up, side = state.film.positions[i]
     up -= state.film.bearings[i].sunk
@@ -429,7 +429,7 @@ def _numerics(scene: ShaftScene, state: ShaftState) -> Numerics:
 
 
 def _warnings(scene: ShaftScene, state: ShaftState, numerics: Numerics) -> tuple[str, ...]:
-    """What a user must know of a run that did not fail."""
+    """Warnings about a run that did not fail."""
     film = state.film
     up = film.reactions[:, 0]
     warnings = [
@@ -439,7 +439,7 @@ def _warnings(scene: ShaftScene, state: ShaftState, numerics: Numerics) -> tuple
         if reaction < _LIFTED * float(np.mean(np.abs(up)))
     ]
     warnings += [
-        f"bearing '{bearing.name}' runs on its edge, film {1e6 * least:.0f} um there and "
+        f"bearing '{bearing.name}' runs on its edge: film {1e6 * least:.0f} um there, "
         f"{1e6 * inside:.0f} um in the middle; turn its bore towards the shaft"
         for bearing, least, inside in zip(
             scene.bearings, film.least_film, film.middle_films, strict=True
@@ -449,8 +449,8 @@ def _warnings(scene: ShaftScene, state: ShaftState, numerics: Numerics) -> tuple
     moved = float(numerics["motion_share"])
     if moved > _MOVED_WARNING:
         warnings.append(
-            f"a journal moves by {moved:.0%} of its least film, and the linear response is good "
-            f"to about {_MOVED_WARNING:.0%}; lower unbalance, blade_rate, turbulence or the force "
+            f"a journal moves by {moved:.0%} of its least film, but the linear response is valid "
+            f"only to about {_MOVED_WARNING:.0%}; lower unbalance, blade_rate, turbulence or force "
             "of exciters"
         )
     if int(numerics["clipped_samples"]) > 0:

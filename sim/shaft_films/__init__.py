@@ -1,4 +1,4 @@
-"""A shaft on its oil films: beam and films balanced together, stiffness and damping about it.
+"""A shaft on its oil films: equilibrium of beam and films, stiffness and damping about it.
 
 It may import ``sim.brief``, ``sim.output``, ``sim.film``, ``sim.bearing``, ``sim.beam``.
 """

@@ -1,4 +1,4 @@
-"""Newton's method for the balance of beam and films, and stronger films on the way to it."""
+"""Newton's method for the equilibrium of beam and films, with continuation from stronger films."""
 
 import math
 from typing import NamedTuple
@@ -15,37 +15,37 @@ Vector = NDArray[np.float64]
 
 _MOST_STEPS = 60  # a dozen from a fair start
 _MOST_HALVINGS = 14
-_NEARLY = 1.5  # strength of films that a finer mesh may make up for
-_NEAREST = 0.85  # of the way to contact in one step
-_LEAST_ROOM = 1e-4  # over C; no mesh resolves a thinner film
-LEAST_SHARE = 0.01  # of the mean load: what a bearing counts as at the least
-_LOOSE = 1e-4  # of the load, on the way of a continuation
+_NEARLY = 1.5  # strength of films up to which a finer mesh may help
+_NEAREST = 0.85  # of the distance to contact in one step
+_LEAST_ROOM = 1e-4  # over C: no mesh resolves a thinner film
+LEAST_SHARE = 0.01  # of the mean load: least reference load of a bearing
+_LOOSE = 1e-4  # of the load, during a continuation
 _STIFFEST = 10.0  # unit of force over the largest load: journals near the middle
 _FIRST_RATIO = 8.0
 _FASTER = 1.5
 _LEAST_RATIO = 1.02
-_CLOSE = 5e-3  # over C: nearer than this an end is taken to be in the way
-_OPPOSITE = -0.5  # cosine of the places where the two ends touch
+_CLOSE = 5e-3  # over C: an end nearer than this counts as touching
+_OPPOSITE = -0.5  # cosine between the positions where the two ends touch
 
 
 class Balance(NamedTuple):
-    """How a search ended."""
+    """Result of a search for the equilibrium."""
 
-    places: Vector  # (b, 4), as the films see them
+    places: Vector  # (b, 4), in film coordinates
     loads: Vector  # of the films (b, 4)
     residual: float
     iterations: int
     status: ShaftFilmStatus
     culprit: int
-    strength: float = 1.0  # of films that are balanced here, over those there are
+    strength: float = 1.0  # factor on the films in equilibrium here, over the actual ones
 
 
-class _Now(NamedTuple):
-    """A trial and what is left over there."""
+class _Trial(NamedTuple):
+    """A trial with its residual."""
 
     places: Vector  # (b, 4)
     loads: Vector  # (b, 4)
-    left: Vector  # (4 b,), in the units of the films
+    left: Vector  # (4 b,), residual in the units of the films
     ok: bool
 
 
@@ -60,7 +60,7 @@ class _System(NamedTuple):
 
 
 def _system(line: CondensedLine, laws: list[FilmLaw], strength: float) -> _System:
-    """With all films, and pedestals along with them, made stronger by a factor."""
+    """Beam and films in film units, with films and pedestals made stronger by a factor."""
     work = strength * line.work
     beam = line.scale[:, None] * line.stiffness * line.scale / work[:, None]
     give = line.flexibility * line.work / line.scale**2
@@ -73,17 +73,17 @@ def _system(line: CondensedLine, laws: list[FilmLaw], strength: float) -> _Syste
     )
 
 
-def _evaluate(system: _System, places: Vector) -> _Now:
+def _evaluate(system: _System, places: Vector) -> _Trial:
     answers = [law.load(place, AT_REST) for law, place in zip(system.laws, places, strict=True)]
     loads = np.array([answer.value for answer in answers])
     left = system.beam @ places.ravel() - system.pull - system.share @ loads.ravel()
-    return _Now(places, loads, left, all(answer.ok for answer in answers))
+    return _Trial(places, loads, left, all(answer.ok for answer in answers))
 
 
 def solve_balance(
     line: CondensedLine, laws: list[FilmLaw], start: Vector, tolerance: float
 ) -> Balance:
-    """Newton from the start, and where that fails by way of stronger films."""
+    """Newton's method from the start, and if that fails, with continuation from stronger films."""
     found = _newton(_system(line, laws, 1.0), start, tolerance)
     if found.status.ok:
         return found
@@ -92,7 +92,7 @@ def solve_balance(
 
 
 def _weakened(line: CondensedLine, laws: list[FilmLaw], tolerance: float) -> Balance:
-    """From films that hold the journals in the middle to those there are, as far as it goes."""
+    """Continuation from films that hold the journals in the middle to the actual ones."""
     places, strength = _near_the_middle(line, laws)
     wanted, ratio, spent, last = strength, _FIRST_RATIO, 0, None
     while True:
@@ -117,7 +117,7 @@ def _weakened(line: CondensedLine, laws: list[FilmLaw], tolerance: float) -> Bal
 
 
 def _near_the_middle(line: CondensedLine, laws: list[FilmLaw]) -> tuple[Vector, float]:
-    """Places off the middle by about a tenth of the clearance, and the films that have them so."""
+    """Positions off the middle by about a tenth of the clearance, and film strengths for them."""
     pull = (line.scale * line.pull / line.work).reshape(-1, 4)
     strength = max(1.0, _STIFFEST * float(np.max(np.abs(pull))))
     places = np.zeros((len(laws), 4))
@@ -149,7 +149,7 @@ def _least_room(system: _System, places: Vector) -> float:
     return min(least_gap(law.geometry, law.tilted, place) for law, place in laws)
 
 
-def _matrix(system: _System, now: _Now) -> Vector:
+def _matrix(system: _System, now: _Trial) -> Vector:
     films = np.zeros_like(system.beam)
     for n, (law, place) in enumerate(zip(system.laws, now.places, strict=True)):
         films[4 * n : 4 * n + 4, 4 * n : 4 * n + 4] = law.coefficients(place).stiffness
@@ -157,8 +157,8 @@ def _matrix(system: _System, now: _Now) -> Vector:
     return matrix
 
 
-def _step(system: _System, now: _Now, matrix: Vector) -> _Now | None:
-    """The next place, or none where no step brings the balance closer."""
+def _step(system: _System, now: _Trial, matrix: Vector) -> _Trial | None:
+    """Next trial, or None if no step reduces the residual."""
     try:
         backward = np.linalg.inv(matrix)
     except np.linalg.LinAlgError:
@@ -179,8 +179,8 @@ def _step(system: _System, now: _Now, matrix: Vector) -> _Now | None:
     return None
 
 
-def _residuals(system: _System, now: _Now) -> Vector:
-    """Force and moment left over, over the load of each bearing (b,)."""
+def _residuals(system: _System, now: _Trial) -> Vector:
+    """Residual force and moment over the load of each bearing (b,)."""
     unit = system.line.work[::4] / -system.line.scale[::4]
     load = np.hypot(*now.loads[:, :2].T) * unit
     load = np.maximum(load, max(LEAST_SHARE * float(np.mean(load)), np.finfo(float).tiny))
@@ -189,7 +189,7 @@ def _residuals(system: _System, now: _Now) -> Vector:
     return residuals
 
 
-def _ended(system: _System, now: _Now, steps: int, status: ShaftFilmStatus | None) -> Balance:
+def _ended(system: _System, now: _Trial, steps: int, status: ShaftFilmStatus | None) -> Balance:
     residuals = _residuals(system, now) if now.ok else np.full(len(system.laws), math.inf)
     worst = int(np.argmax(residuals))
     residual = float(residuals[worst])
@@ -205,8 +205,8 @@ def _ended(system: _System, now: _Now, steps: int, status: ShaftFilmStatus | Non
     )
 
 
-def _diagnosis(system: _System, now: _Now, worst: int) -> tuple[ShaftFilmStatus, int]:
-    """Which bearing is in the way, and how."""
+def _diagnosis(system: _System, now: _Trial, worst: int) -> tuple[ShaftFilmStatus, int]:
+    """Bearing that prevents an equilibrium, and the reason."""
     rooms = [
         edge_gaps(law.geometry, law.tilted, place)
         for law, place in zip(system.laws, now.places, strict=True)
@@ -223,6 +223,6 @@ def _diagnosis(system: _System, now: _Now, worst: int) -> tuple[ShaftFilmStatus,
 
 
 def may_be_refined(found: Balance) -> bool:
-    """Whether there is a balance, or a finer mesh might carry an edge that this one does not."""
+    """Whether there is an equilibrium, or a finer mesh might help with an edge."""
     edge = found.status is ShaftFilmStatus.EDGE_CONTACT
     return found.status.ok or (edge and found.strength < _NEARLY)

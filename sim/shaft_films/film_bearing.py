@@ -1,4 +1,4 @@
-"""A journal bearing in its place on a shaft line, new or worn."""
+"""A journal bearing on a shaft line, new or worn."""
 
 import math
 from collections.abc import Sequence
@@ -15,28 +15,28 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FilmBearing:
-    """A journal bearing in its place on a shaft line.
+    """A journal bearing on a shaft line.
 
     Attributes
     ----------
     name : str
     station : float
-        Of the middle of its length, a node of the beam [m].
+        Position of the middle of its length, a node of the beam [m].
     bearing : JournalBearing
-        As new.
+        Bearing as new.
     offset : float
-        Height of the journal's centre when it lies at the bottom of the bore as new, positive up
+        Height of the journal's centre when it lies at the bottom of the new bore, positive up
         [m].
     side_offset : float
-        Of the bore's centre along z [m].
+        Position of the bore's centre along z [m].
     slope : tuple of float
-        Of the bore, dy/dx and dz/dx [rad].
+        Slope of the bore, dy/dx and dz/dx [rad].
     wear_down : float
-        By which the bottom has sunk, >= 0 [m].
+        Wear of the bottom of the bore, >= 0 [m].
     arc_clearance : float or None
-        Of the journal in the arc that it has worn, over the bore's as new, > 0. None: the bore
-        stays a circle, whose diametral clearance grows by the wear-down and whose centre sinks by
-        half of it.
+        Clearance of the journal in the arc that it has worn, over the bore's as new, > 0. None: the
+        bore stays a circle, whose diametral clearance grows by the wear-down and whose centre sinks
+        by half of it.
 
     Raises
     ------
@@ -85,7 +85,7 @@ class FilmBearing:
 
     @property
     def worn(self) -> JournalBearing:
-        """The bearing with its present bore; its profile and the feed pressure stay in SI."""
+        """Bearing with its present bore; its profile and the feed pressure stay in SI."""
         if self.wear_down == 0:
             return self.bearing
         if self.arc_clearance is not None:
@@ -107,20 +107,20 @@ class FilmBearing:
 
     @property
     def bottom(self) -> float:
-        """Way of the journal from the middle of the present bore down to its bottom [m]."""
+        """Distance of the journal from the middle of the present bore down to its bottom [m]."""
         return self.bearing.clearance + self.wear_down - self.sunk
 
     @property
     def sunk(self) -> float:
-        """By which the middle of the bore is lower than as new [m]."""
+        """Distance by which the middle of the bore is lower than as new [m]."""
         return 0.0 if self.arc_clearance is not None else self.wear_down / 2
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Of the bore, y and z [m]."""
+        """Centre of the bore, y and z [m]."""
         return self.offset + self.bearing.clearance - self.sunk, self.side_offset
 
 
 def clearances_of(bearings: Sequence[FilmBearing]) -> Vector:
-    """Radial, as worn [m, shape=(n,)]."""
+    """Radial clearances, as worn [m, shape=(n,)]."""
     return np.array([b.worn.clearance for b in bearings])

@@ -1,4 +1,4 @@
-"""Film of one bearing as the balance sees it: load, stiffness, damping, and the gap left."""
+"""Film of one bearing for the equilibrium: load, stiffness, damping, and remaining gap."""
 
 import math
 from collections.abc import Callable
@@ -20,25 +20,25 @@ from .film_bearing import FilmBearing
 
 Vector = NDArray[np.float64]
 
-_STEEPEST = 1.0  # rise of the gap from an edge to the next node, over the gap there
-_DISPLACEMENT = 1e-5  # of the least gap
-_RATE = 1e-5  # of the surface speed's share of a gap
+_STEEPEST = 1.0  # increase of the gap from an edge to the next node, over the gap there
+_DISPLACEMENT = 1e-5  # step of a position, of the least gap
+_RATE = 1e-5  # step of a rate, of the surface speed's share of a gap
 
 
 class _Load(NamedTuple):
-    """Of a film on its journal: F_X, F_Y and the moments."""
+    """Load of a film on its journal: F_X, F_Y and the moments."""
 
     value: Vector
     ok: bool
 
 
 class FilmLaw(NamedTuple):
-    """How the film of one bearing answers a place (X, Y, tilt_x, tilt_y) and its rates."""
+    """Film of one bearing as a function of the position (X, Y, tilt_x, tilt_y) and its rates."""
 
     geometry: FilmGeometry
     tilted: bool
     load: Callable[[Vector, Vector], _Load]
-    coefficients: Callable[[Vector], Coefficients]  # at the place of the last load
+    coefficients: Callable[[Vector], Coefficients]  # at the position of the last load
     solution: Callable[[Vector], FilmSolution]
 
 
@@ -47,7 +47,7 @@ _RUNGS = {rung.name: rung for rung in FILM_RUNGS}
 
 
 def law_of(rung: str, tilted: bool, bearing: FilmBearing) -> FilmLaw:
-    """Film of a bearing as worn; raises ValueError at a film that the balance cannot use."""
+    """Film of a worn bearing; raises ValueError for a film unsuitable for the equilibrium."""
     geometry = bearing.worn.geometry
     if geometry.condition == "reynolds":
         raise ValueError(
@@ -60,7 +60,7 @@ def law_of(rung: str, tilted: bool, bearing: FilmBearing) -> FilmLaw:
 
 
 def law_on(rung: str, tilted: bool, geometry: FilmGeometry) -> FilmLaw:
-    """Of a rung, on a geometry."""
+    """Film of a rung on a geometry."""
     if rung == "direct":
         return _direct_law(geometry, tilted)
     if rung == "map":
@@ -124,7 +124,7 @@ def _direct_coefficients(work: DirectFilm, tilted: bool, place: Vector) -> Coeff
 
 
 def _widened(own: Coefficients) -> Coefficients:
-    """4 x 4, zero where the film knows no tilt."""
+    """Extend 2 x 2 to 4 x 4 matrices, with zeros for a film without tilt."""
     if own.stiffness.shape[0] == 4:
         return own
     return Coefficients(np.pad(own.stiffness, (0, 2)), np.pad(own.damping, (0, 2)))
@@ -150,7 +150,7 @@ def _displaced(
     load: Callable[[Vector, Vector], _Load],
     place: Vector,
 ) -> Coefficients:
-    """Central differences; of the tilt only where the film knows it."""
+    """Coefficients by central differences; for the tilt only if the film supports it."""
     step = _DISPLACEMENT * least_gap(geometry, tilted, place)
     stiffness, damping = np.zeros((4, 4)), np.zeros((4, 4))
     for axis in range(4 if tilted else 2):
@@ -164,25 +164,25 @@ def _displaced(
 
 
 def edge_gaps(geometry: FilmGeometry, tilted: bool, place: Vector) -> Vector:
-    """At both ends, over C (2, n_theta)."""
+    """Gaps at both ends, over C (2, n_theta)."""
     half = 0.5 * place[2:] if tilted else np.zeros(2)
     bore = 1.0 if geometry.bore is None else 1.0 + np.asarray(geometry.bore)
     return bore - np.array([place[:2] - half, place[:2] + half]) @ directions(geometry.n_theta)
 
 
 def directions(count: int) -> Vector:
-    """Of the nodes round the bore (2, count)."""
+    """Directions of the nodes round the bore (2, count)."""
     angle = 2 * math.pi * np.arange(count) / count
     return np.array([np.cos(angle), np.sin(angle)])
 
 
 def least_gap(geometry: FilmGeometry, tilted: bool, place: Vector) -> float:
-    """At the ends, over C."""
+    """Least gap at the ends, over C."""
     return float(np.min(edge_gaps(geometry, tilted, place)))
 
 
 def share_to_contact(law: FilmLaw, place: Vector, step: Vector) -> float:
-    """Share of the step at which the journal would touch."""
+    """Share of the step at which the journal would touch the bore."""
     now = edge_gaps(law.geometry, law.tilted, place)
     loss = now - edge_gaps(law.geometry, law.tilted, place + step)
     closing = loss > 0
@@ -190,7 +190,7 @@ def share_to_contact(law: FilmLaw, place: Vector, step: Vector) -> float:
 
 
 def finer_law(law: FilmLaw, place: Vector) -> FilmLaw:
-    """The same film on a mesh twice as fine where this one is too coarse, or itself."""
+    """The same film on a mesh twice as fine if this one is too coarse, else itself."""
     geometry, bore = law.geometry, law.geometry.bore
     if law.solution(place).status is FilmStatus.COARSE:
         if bore is not None:  # linear between the nodes

@@ -15,18 +15,18 @@ Vector = NDArray[np.float64]
 
 
 class CondensedLine(NamedTuple):
-    """Beam and bores; the order within a bearing is y, z, y', z', of a film X, Y and the tilts."""
+    """Beam and bores; the order within a bearing is y, z, y', z', for a film X, Y and the tilts."""
 
     bearings: tuple[FilmBearing, ...]
     speed: float
     stiffness: Vector  # of the beam at the bearings (4 b, 4 b)
     pull: Vector  # of the beam on the journals, each in the middle of its bore (4 b,)
-    bores: Vector  # their places without load (4 b,)
+    bores: Vector  # positions of the unloaded bores (4 b,)
     pedestals: tuple[tuple[float, float], ...]
     flexibility: Vector  # of the pedestals (4 b,)
-    scale: Vector  # a journal's place by the film's coordinates (4 b,)
+    scale: Vector  # journal position per film coordinate (4 b,)
     work: Vector  # unit of force times that of length (4 b,)
-    spread: Callable[[Vector], Vector]  # places at the bearings -> deflection of the whole beam
+    spread: Callable[[Vector], Vector]  # displacements at bearings -> deflection of the beam
 
 
 def condensed_line(
@@ -35,7 +35,7 @@ def condensed_line(
     speed: float,
     pedestals: Sequence[tuple[float, float]] | None,
 ) -> CondensedLine:
-    """Beam and bores of a shaft that turns; raises ValueError where an argument is out of range."""
+    """Condense beam and bores of a rotating shaft; raises ValueError for arguments out of range."""
     if not 0 < speed < math.inf:
         raise ValueError(
             f"speed = {speed} rad/s must be > 0 and finite; a film needs a turning shaft"
@@ -61,9 +61,9 @@ def condensed_line(
 
 
 def bearing_nodes(beam: Beam, bearings: Sequence[FilmBearing]) -> list[int]:
-    """Of the beam, one for each bearing; raises ValueError where two share a name or a node."""
+    """Beam nodes of the bearings; raises ValueError if two share a name or a node."""
     if not bearings:
-        raise ValueError("bearings = () must hold at least one; a shaft needs something to lie on")
+        raise ValueError("bearings = () must hold at least one; a shaft needs a support")
     nodes = [beam.node(b.station) for b in bearings]
     for what, values in (("name", [b.name for b in bearings]), ("node of the beam", nodes)):
         if len(set(values)) < len(values):
@@ -76,7 +76,7 @@ def bearing_nodes(beam: Beam, bearings: Sequence[FilmBearing]) -> list[int]:
 def condensed(
     beam: Beam, nodes: Sequence[int]
 ) -> tuple[Vector, Vector, Callable[[Vector], Vector]]:
-    """Stiffness and load at the bearings, and how the rest of the beam follows."""
+    """Stiffness and load at the bearings, and the expansion to the rest of the beam."""
     kept = (4 * np.array(nodes)[:, None] + np.array([0, 2, 1, 3])).ravel()
     count = beam.stiffness.shape[0]
     rest = np.setdiff1d(np.arange(count), kept)

@@ -1,21 +1,21 @@
 """A shaft on its oil films: beam and films solved together.
 
-The beam is condensed once to its bearings, where four numbers are left of it: height, side and
-both slopes. In each bearing the film answers the position and the tilt of the journal with a force
-and a moment, and Newton's method brings beam and films into balance, with the film's own
+The beam is condensed once to four coordinates at each bearing: height, side and both slopes. The
+film of a bearing responds to the position and the tilt of the journal with a force and a moment,
+and Newton's method finds the equilibrium of beam and films, using the film's own
 stiffness. A rigid journal under a force and a moment is the case of one bearing.
 
 Axes are the shaft's: y up, z to the right looking forward, slopes ``y' = dy/dx`` and
-``z' = dz/dx``, positive speed from y to z. Those of the film are turned: ``(X, Y) = -(y, z) / C``,
+``z' = dz/dx``, positive speed from y to z. Those of the film are rotated: ``(X, Y) = -(y, z) / C``,
 and the tilts are ``-(y', z') L / C``, all of the journal relative to the bore. Matrices of a
 bearing are in the order y, z, y', z'.
 
-Each bearing's heights refer to the journal: `offset` is the height of its centre when it lies at
-the bottom of the bore, whose own centre is one radial clearance above.
+Each bearing's height refers to the journal: `offset` is the height of its centre when it lies at
+the bottom of the bore, whose own centre is one radial clearance higher.
 
-What a film is worth on a shaft, on the built-in *propulsion-shaft* as built, with the stern bearing
-worn down by 0.9 mm, and with a line bearing sagged by 1.2 mm; the largest differences from the film
-*direct* on 144 x 33 nodes, that of the reactions over their mean:
+Effect of the film model on the built-in *propulsion-shaft* as built, with the stern bearing
+worn down by 0.9 mm, and with a line bearing sagged by 1.2 mm: largest differences from the film
+*direct* on 144 x 33 nodes, reactions over their mean:
 
 ================================  =========  ==========  ==================  =====
 film                              reactions  least film  stiffness, damping  ms
@@ -27,10 +27,10 @@ direct, 72 x 17                   0.1 %      0.5 %       3 %                 18
 mass-conserving against direct    0.2 %      2 %         6 %                 4,000
 ================================  =========  ==========  ==================  =====
 
-Without moments and tilt, reactions hold within 4 % and frequencies within 6 % (23 % on a line with
-a heavier propeller), but the first bending modes lose their damping: 0.7 % of the critical instead
-of 39 %. Against rigid supports the films, with their pedestals, move reactions by up to 6 %. The
-last row has two axial grooves in every bearing. Times are of a processor, five bearings.
+Without moments and tilt, reactions are within 4 % and frequencies within 6 % (23 % on a line with
+a heavier propeller), but the first bending modes lose their damping: 0.7 % of critical instead
+of 39 %. Compared with rigid supports, films with their pedestals change reactions by up to 6 %. The
+last row has two axial grooves in every bearing. Times are processor times for five bearings.
 """
 
 import math
@@ -59,54 +59,54 @@ _TOLERANCE = 1e-9  # of the load
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BeamFilm:
-    """A shaft at rest on its films.
+    """A shaft in equilibrium on its films.
 
     Attributes
     ----------
     bearings : tuple of FilmBearing
-        As given, n of them.
+        As passed, n of them.
     rung : str
     speed : float
-        [rad/s]
+        Shaft speed [rad/s].
     positions : numpy.ndarray [shape=(n, 2)]
         Journal's centre relative to the bore's, y and z [m].
     slopes : numpy.ndarray [shape=(n, 2)]
-        Of the journal relative to the bore [rad].
+        Slopes of the journal relative to the bore [rad].
     reactions : numpy.ndarray [shape=(n, 2)]
         Force of the film on the shaft, y and z [N].
     moments : numpy.ndarray [shape=(n, 2)]
-        Of the film on the shaft, conjugate to y' and z' [N m].
+        Moment of the film on the shaft, conjugate to y' and z' [N m].
     stiffness : numpy.ndarray [shape=(n, 4, 4)]
-        Fall of force and moment by y, z, y', z' [N/m], [N/rad], [N m/m], [N m/rad]. Zero in what
-        the rung leaves out.
+        Negative derivatives of force and moment by y, z, y', z' [N/m], [N/rad], [N m/m], [N m/rad].
+        Zero for what the rung neglects.
     damping : numpy.ndarray [shape=(n, 4, 4)]
-        The same by their rates, times a second.
+        The same for their rates, units times a second.
     least_film : numpy.ndarray [shape=(n,)]
-        [m]
+        Least film thickness [m].
     peak_pressure : numpy.ndarray [shape=(n,)]
-        [Pa]
+        Largest film pressure [Pa].
     films : tuple of FilmSolution
-        Non-dimensional.
+        Film solutions, non-dimensional.
     geometries : tuple of FilmGeometry
-        On which they were found: the mesh may have been doubled.
+        Geometries of the films: the mesh may have been refined.
     pedestals : tuple of tuple of float
         Stiffness under each bore, y and z [N/m].
     give : numpy.ndarray [shape=(n, 2)]
-        By which each bore's centre has moved on its pedestal, y and z [m].
+        Displacement of each bore's centre on its pedestal, y and z [m].
     deflection : numpy.ndarray [shape=(4 * nodes,)]
-        Of the beam, in its own order [m], [rad].
+        Deflection of the beam, in its own order [m], [rad].
     residual : float
-        Force or moment left over at the worst bearing, over its load, and over its load times its
-        length; of a bearing with less than 1 % of the mean load, over that.
+        Residual force or moment at the worst bearing, over its load, and over its load times its
+        length; for a bearing with less than 1 % of the mean load, over that load.
     iterations : int
-        Newton steps.
+        Number of Newton steps.
     status : ShaftFilmStatus
     culprit : str
-        The bearing that the status speaks of, or that of the largest residual.
+        Bearing that the status refers to, or that of the largest residual.
     strength : float
-        1, or without a balance by how much viscosity or speed would have to grow for that of the
-        state shown, the last one found: positions, forces and matrices are those of the films
-        there are in these places.
+        1; or, without an equilibrium, the factor by which viscosity or speed would have to grow for
+        an equilibrium in the state shown, the last one found: positions, forces and matrices are
+        those of the actual films in these positions.
     """
 
     bearings: tuple[FilmBearing, ...]
@@ -135,9 +135,10 @@ class BeamFilm:
 
     @property
     def eccentricity_ratios(self) -> Vector:
-        """What the film in the middle lacks of the radial clearance, over it [shape=(n,)].
+        """Eccentricity ratios from the film in the middle of the length [shape=(n,)].
 
-        In a round bore the distance of the centres over the clearance.
+        One minus the least film there over the radial clearance; in a round bore the distance of
+        the centres over the clearance.
         """
         ratios: Vector = np.hypot(*self.positions.T) / clearances_of(self.bearings)
         for n, (geometry, place) in enumerate(zip(self.geometries, self.positions, strict=True)):
@@ -153,7 +154,7 @@ class BeamFilm:
 
     @property
     def unloaded(self) -> tuple[str, ...]:
-        """Bearings that do not carry: pushed down, or by less than 1 % of the mean load."""
+        """Bearings that do not carry: loaded downwards, or by less than 1 % of the mean load."""
         up = self.reactions[:, 0]
         least = LEAST_SHARE * float(np.mean(np.abs(up)))
         return tuple(b.name for b, r in zip(self.bearings, up, strict=True) if r < least)
@@ -172,35 +173,35 @@ def beam_film(
     tolerance: float = _TOLERANCE,
     raise_on_failure: bool = True,
 ) -> BeamFilm:
-    """Balance of a shaft on its oil films.
+    """Equilibrium of a shaft on its oil films.
 
     Parameters
     ----------
     beam : Beam
-        With its loads; the station of every bearing is a node.
+        Beam with its loads; the station of every bearing is a node.
     bearings : sequence of FilmBearing
         In any order; each on its own node.
     speed : float
-        Of the shaft, > 0 [rad/s].
+        Shaft speed > 0 [rad/s].
     rung : str
-        ``"direct"`` or ``"mass-conserving"``, which have the film of a tilted journal, or
-        ``"short"``, ``"long"``, ``"finite"``, ``"map"``, for which the journal lies in the bearing
-        as it does in the middle of the length, without a moment.
+        ``"direct"`` or ``"mass-conserving"``, which support a tilted journal, or
+        ``"short"``, ``"long"``, ``"finite"``, ``"map"``, for which the journal is aligned at its
+        position in the middle of the length, without a moment.
     tilted : bool
-        False takes those two as well without tilt.
+        False: neglect the tilt for those two rungs as well.
     pedestals : sequence of tuple of float, optional
         Stiffness under each bore along y and z [N/m], in the order of the bearings;
         ``math.inf`` is rigid, as all are by default. Offsets are those of the bores without load.
     start : BeamFilm, optional
-        Of a case nearby with as many bearings.
+        Result for a similar case with the same number of bearings.
     refinements : int
-        How many times the mesh of a bearing may be doubled where its film is too thin for it, on
-        the rung *direct*: round the bore, or along the length where the gap doubles between an
+        Number of times the mesh of a bearing may be doubled if its film is too thin for it, with
+        the rung *direct*: round the bore, or along the length if the gap doubles between an
         edge and the next node.
     tolerance : float
-        Of the residual.
+        Tolerance of the residual.
     raise_on_failure : bool
-        False returns the last state with its status instead.
+        False: return the last state with its status instead.
 
     Returns
     -------
@@ -210,24 +211,24 @@ def beam_film(
     Raises
     ------
     ShaftFilmError
-        No balance was found; names the bearing and the cure.
+        No equilibrium was found; the message names the bearing and the cure.
     ValueError
-        A name or a node is taken twice, the speed is not above zero, there is no such rung, or a
+        A name or a node is used twice, the speed is not above zero, there is no such rung, or a
         film has the condition *reynolds*.
 
     Notes
     -----
-    With the beam condensed to its bearings, ``K`` and ``f``, the bores' places ``q0``, the
-    journals' places in them ``u`` and the film's force ``R(u)``::
+    With the beam condensed to its bearings, ``K`` and ``f``, the bores' positions ``q0``, the
+    journals' positions in them ``u`` and the film's force ``R(u)``::
 
         K (q0 + u - R / pedestal) - f = R(u)
 
-    Newton's method with ``dR/du`` of the film; a step goes at most 85 % of the way to contact in
-    any bearing and is halved until the next one, by the same matrix, gets smaller (the natural
-    test, which does not care for the units of forces and moments). Where that fails, the films
+    Newton's method with ``dR/du`` of the film; a step is limited to 85 % of the distance to contact
+    in any bearing and halved until the next one, by the same matrix, gets smaller (the natural
+    test, which is independent of the units of forces and moments). If that fails, the films
     are first made so stiff that they hold all journals in the middle, and weakened step by step.
 
-    Laminar, isothermal, steady; the bearings are long enough apart that each acts on one node.
+    Laminar, isothermal, steady; the bearings are far enough apart that each acts on one node.
 
     References
     ----------
@@ -272,18 +273,18 @@ def supports(
     housing_masses: Sequence[float] | None = None,
     pedestal_damping: Sequence[tuple[float, float]] | None = None,
 ) -> tuple[Support, ...]:
-    """The films as supports of a rotor, about the balance.
+    """Films as supports of a rotor, about the equilibrium.
 
     Parameters
     ----------
     found : BeamFilm
-        Of :func:`beam_film`.
+        Result of :func:`beam_film`.
     moments : bool
-        False leaves out what has to do with slopes; so do the rungs without tilt.
+        False: omit all coefficients of slopes, as rungs without tilt do.
     housing_masses : sequence of float, optional
-        That move with each bore [kg]; needed where the pedestals were not rigid.
+        Masses that move with each bore [kg]; needed unless the pedestals are rigid.
     pedestal_damping : sequence of tuple of float, optional
-        Under each bore along y and z [N s/m], by default none.
+        Damping under each bore along y and z [N s/m], by default none.
 
     Returns
     -------
@@ -334,7 +335,7 @@ def _support(
     if mass is None or max(pedestal) == math.inf:
         raise ValueError(
             f"bearing '{bearing.name}' on a pedestal of {pedestal} N/m must have a housing mass "
-            "and a pedestal that gives both ways; give housing_masses, or rigid pedestals"
+            "and a pedestal flexible in both directions; give housing_masses, or rigid pedestals"
         )
     return replace(film, housing_mass=mass, pedestal_stiffness=pedestal, pedestal_damping=damping)
 
@@ -342,7 +343,7 @@ def _support(
 def _check_held(line: CondensedLine, laws: Sequence[FilmLaw]) -> None:
     if len(laws) == 1 and not laws[0].tilted:
         raise ValueError(
-            f"bearing '{line.bearings[0].name}' alone must resist tilt; take the rung 'direct' "
+            f"bearing '{line.bearings[0].name}' alone must resist tilt; use the rung 'direct' "
             "with tilt, or give the shaft a second bearing"
         )
 

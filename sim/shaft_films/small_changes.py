@@ -1,4 +1,4 @@
-"""How a balance follows small changes of the line."""
+"""Derivatives of an equilibrium for small changes of the line."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,36 +12,36 @@ from .on_oil_films import BeamFilm
 Vector = NDArray[np.float64]
 
 GRADIENT_STEP = 0.1
-"""Of :func:`coefficient_gradients`, over the least gap [-]: some nodes of a mesh fill or empty on
-the way."""
+"""Step of :func:`coefficient_gradients`, over the least gap [-]: some nodes of a mesh fill or empty
+within it."""
 
 
 def journal_shifts(
     beam: Beam, found: BeamFilm, *, bores: Vector, forces: Vector, gives: Vector
 ) -> Vector:
-    """How far the journals shift in their bores when something changes a little, to first order.
+    """Displacements of the journals in their bores for small changes of the line, to first order.
 
     Parameters
     ----------
     beam : Beam
-        With which the balance was found.
+        Beam of the equilibrium.
     found : BeamFilm
     bores : numpy.ndarray [shape=(p, n, 4)]
-        By which the bores move, y, z [m] and y', z' [rad].
+        Displacements of the bores, y, z [m] and y', z' [rad].
     forces : numpy.ndarray [shape=(p, n, 4)]
-        By which the films push more with the journals where they are [N], [N m].
+        Changes of the film forces with the journals fixed [N], [N m].
     gives : numpy.ndarray [shape=(p, n, 4)]
-        By which the pedestals give more under the forces there are [m], zero for the slopes.
+        Changes of the pedestals' displacement under the present forces [m], zero for the slopes.
 
     Returns
     -------
     numpy.ndarray [shape=(p, n, 4)]
-        Of the journals relative to the bores, y, z [m] and y', z' [rad].
+        Displacements of the journals relative to the bores, y, z [m] and y', z' [rad].
 
     Notes
     -----
-    The balance of :func:`beam_film`, differentiated: with the films' stiffness ``S``, the beam's
-    ``K`` and the pedestals' flexibility ``P``,
+    The equilibrium of :func:`beam_film`, differentiated: with the films' stiffness ``S``, the
+    beam's ``K`` and the pedestals' flexibility ``P``,
     ``(K + K P S + S) du = (1 + K P) dR - K (dq0 + dg)``.
 
     Examples
@@ -77,21 +77,22 @@ def journal_shifts(
 
 
 def coefficient_gradients(found: BeamFilm, *, step: float = GRADIENT_STEP) -> tuple[Vector, Vector]:
-    """How the films' stiffness and damping change as the journals shift in their bores.
+    """Derivatives of the films' stiffness and damping for displacements of the journals.
 
     Parameters
     ----------
     found : BeamFilm
     step : float
-        Of the central differences, over the least gap of each film [-]. The coefficients of the
-        rung *direct* jump by a per cent as nodes of its mesh fill and empty; with the default, over
-        several of them, its gradients are within a tenth of those of 384 nodes round the bore.
+        Step of the central differences, over the least gap of each film [-]. The coefficients of
+        the rung *direct* jump by a per cent as nodes of its mesh fill and empty; with the default,
+        over several of them, its gradients are within a tenth of those with 384 nodes round the
+        bore.
 
     Returns
     -------
     stiffness, damping : numpy.ndarray [shape=(n, 4, 4, 4)]
-        By the shift along y, z [1/m], y', z' [1/rad], the second axis; matrices as in
-        :class:`BeamFilm`. Zero along what the rung leaves out.
+        Derivatives by y, z [1/m], y', z' [1/rad] along the second axis; matrices as in
+        :class:`BeamFilm`. Zero for what the rung neglects.
 
     Examples
     --------

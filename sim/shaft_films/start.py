@@ -1,4 +1,4 @@
-"""Where the search for the balance starts."""
+"""Start of the search for the equilibrium."""
 
 import math
 from collections.abc import Sequence
@@ -14,12 +14,12 @@ from .line import CondensedLine
 
 Vector = NDArray[np.float64]
 
-_MOST_START = 0.9  # eccentricity to start from
-_START_TILT = 0.5  # of the room beside that
+_MOST_START = 0.9  # largest eccentricity of a start
+_START_TILT = 0.5  # of the remaining gap
 
 
 def first_places(line: CondensedLine, laws: Sequence[FilmLaw]) -> Vector:
-    """Each journal where a short film carries what a bearing without film would, tilted less."""
+    """Positions where short films carry the reactions without films, with limited tilt."""
     reactions, slopes = _pinned(line)
     places = np.zeros((len(laws), 4))
     for n, (law, bearing) in enumerate(zip(laws, line.bearings, strict=True)):
@@ -33,7 +33,7 @@ def first_places(line: CondensedLine, laws: Sequence[FilmLaw]) -> Vector:
 
 
 def _first_place(geometry: FilmGeometry, bearing: FilmBearing, load: Vector) -> Vector:
-    """Of a short bearing: in the circle of the worn arc, if the bore has room for it there."""
+    """Position in a short bearing: in the circle of the worn arc, if the bore has room for it."""
     ratio = geometry.length_to_diameter
     if bearing.wear_down > 0 and (own := bearing.arc_clearance) is not None:
         lower = bearing.wear_down / bearing.bearing.clearance + 1 - own
@@ -44,7 +44,7 @@ def _first_place(geometry: FilmGeometry, bearing: FilmBearing, load: Vector) -> 
 
 
 def short_place(length_to_diameter: float, load: Vector) -> Vector:
-    """Of a short bearing, its force lowered as a finite length does."""
+    """Position in a short bearing, with its force reduced for the finite length."""
     size = float(np.hypot(*load))
     if size == 0:
         return np.zeros(2)
@@ -54,7 +54,7 @@ def short_place(length_to_diameter: float, load: Vector) -> Vector:
 
 
 def _pinned(line: CondensedLine) -> tuple[Vector, Vector]:
-    """Reactions and slopes relative to the bores of a beam pinned at their bottoms (b, 2)."""
+    """Reactions and slopes relative to the bores for a beam pinned at their bottoms (b, 2)."""
     count = len(line.bearings)
     places = np.arange(4 * count).reshape(-1, 4)
     held, free = places[:, :2].ravel(), places[:, 2:].ravel()

@@ -1,10 +1,10 @@
-"""How the search for the balance of shaft and films ended, with the cure."""
+"""How the search for the equilibrium of shaft and films ended, with the cure."""
 
 from ..output.status import Ending
 
 
 class ShaftFilmStatus(Ending):
-    """How the search for the balance ended. Everything but OK carries a cure."""
+    """How the search for the equilibrium ended. Every status except OK includes a cure."""
 
     OK = 0, "done"
     OVERLOAD = (
@@ -24,18 +24,18 @@ class ShaftFilmStatus(Ending):
     )
     NO_CONVERGENCE = (
         4,
-        "beam and films found no balance; give a start closer to it, refine the "
+        "beam and films found no equilibrium; give a start closer to it, refine the "
         "mesh, or lower a groove's feed pressure that outweighs the load",
     )
     COARSE = (
         5,
-        "the film is too thin for the mesh, and the answer with it; raise n_theta or the number of "
-        "refinements, or lower the load",
+        "the film is too thin for the mesh, so the result is inaccurate; raise n_theta or the "
+        "number of refinements, or lower the load",
     )
 
 
 class ShaftFilmError(RuntimeError):
-    """A shaft was not balanced on its films and the caller asked to be told so."""
+    """No equilibrium of a shaft on its films was found, and the caller asked for an error."""
 
     def __init__(self, status: ShaftFilmStatus, bearing: str) -> None:
         self.status = status

@@ -1,8 +1,8 @@
-"""Coordinates of a rotor by name, and arguments checked.
+"""Coordinates of a rotor by name, and checks of arguments.
 
-A place is a coordinate's number, or what :meth:`.Rotor.dof` takes: ``("stern", "y")`` or
-``("stern", "y", "housing")``. A displacement of a support that is a housing's is so told apart from
-the shaft's there.
+A place is the index of a coordinate, or an argument of :meth:`.Rotor.dof`: ``("stern", "y")`` or
+``("stern", "y", "housing")``, which distinguishes a housing's displacement from that of the shaft
+in its bearing.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ Place = int | tuple[str | float, str] | tuple[str | float, str, str]
 
 
 def dofs(rotor: Rotor, places: Sequence[Place]) -> Index:
-    """Numbers of the coordinates; raises ValueError at a place that the rotor has not."""
+    """Indices of the coordinates; raises ValueError for an unknown place."""
     return np.array([_dof(rotor, place) for place in places], dtype=np.int64)
 
 
@@ -35,7 +35,7 @@ def _dof(rotor: Rotor, place: Place) -> int:
 
 
 def checked_frequencies(frequencies: ArrayLike) -> Vector:
-    """One row of finite numbers [Hz], or ValueError."""
+    """Check that frequencies are one row of finite numbers [Hz]; raises ValueError."""
     hertz = np.asarray(frequencies, dtype=float)
     if hertz.ndim != 1 or not np.isfinite(hertz).all():
         raise ValueError(
@@ -45,7 +45,7 @@ def checked_frequencies(frequencies: ArrayLike) -> Vector:
 
 
 def checked_speed(speed: ArrayLike) -> Vector:
-    """Finite [rad/s], or ValueError."""
+    """Check that speeds are finite [rad/s]; raises ValueError."""
     turning = np.asarray(speed, dtype=float)
     if not np.isfinite(turning).all():
         raise ValueError(f"speed = {speed!r} rad/s must be finite")

@@ -3,8 +3,8 @@
 Receptance is displacement over force, accelerance acceleration over force, both for
 ``exp(+i omega t)``: a spring's receptance is real and positive, a mass's accelerance too.
 Frequencies are in Hz, the shaft's speed in rad/s as everywhere in the shaft line. The nodes between
-the stations of interest are eliminated, then there is one dense solve for each frequency; the error
-is that of rounding.
+the stations of interest are eliminated, leaving one dense solve for each frequency; the error
+is at rounding level.
 """
 
 import math
@@ -19,9 +19,9 @@ from scipy.sparse.linalg import splu
 from ..beam.rotor import Rotor
 from .places import Complex, Index, Place, Vector, checked_frequencies, checked_speed, dofs
 
-_LINES = 256  # solved at once: what they need stays in the cache
+_LINES = 256  # solved together: their data fit the cache
 _ISOTROPY = 1e-9  # of the largest entry: rounding of an assembly
-_MOST_GROWTH = 10.0  # of an elimination without exchange of rows; it costs digits by its square
+_MOST_GROWTH = 10.0  # of an elimination without pivoting; the lost digits are its square
 _UNRESTRAINED = 1e-14  # reciprocal condition of the stiffness
 
 
@@ -40,11 +40,11 @@ def receptance(
     rotor : Rotor
         Shaft on its supports.
     frequencies : array-like [shape=(n_freq,)]
-        Of the forces [Hz].
+        Frequencies of the forces [Hz].
     responses, forces : sequence of place
-        Coordinates, or what :meth:`Rotor.dof` takes.
+        Coordinates, or arguments of :meth:`Rotor.dof`.
     speed : float or array-like [shape=(n_freq,)]
-        Of the shaft [rad/s]; one for each frequency where they go together, as in a run-up.
+        Shaft speed [rad/s]; one per frequency if they vary together, as in a run-up.
 
     Returns
     -------
@@ -55,14 +55,14 @@ def receptance(
     ------
     ValueError
         A frequency or the speed is not finite, a place is unknown, or a static force (0 Hz) acts
-        on a shaft that nothing holds.
+        on a shaft without restraint.
 
     Notes
     -----
     ``(K - w^2 M + i w (C + Omega G)) q = f``. Away from the supports both planes have the same
-    matrices, so that u = y + i z and v = y - i z part: 2 x 2 blocks along the shaft, with
+    matrices, so that u = y + i z and v = y - i z decouple: 2 x 2 blocks along the shaft, with
     ``+- w Omega g`` for the gyroscopic moments (g couples y with z). These are eliminated node by
-    node between the stations where something acts or is asked for; what is left is dense and holds
+    node between the stations of forces and responses; the remaining system is dense and includes
     the films and housings.
 
     Examples
@@ -111,11 +111,11 @@ def accelerance(
     rotor : Rotor
         Shaft on its supports.
     frequencies : array-like [shape=(n_freq,)]
-        Of the forces [Hz].
+        Frequencies of the forces [Hz].
     responses, forces : sequence of place
-        Coordinates, or what :meth:`Rotor.dof` takes.
+        Coordinates, or arguments of :meth:`Rotor.dof`.
     speed : float or array-like [shape=(n_freq,)]
-        Of the shaft [rad/s].
+        Shaft speed [rad/s].
 
     Returns
     -------
@@ -142,9 +142,9 @@ def accelerance(
 
 @dataclass(frozen=True, kw_only=True)
 class _Chain:
-    """A rotor's matrices, sorted for the elimination.
+    """Matrices of a rotor, sorted for the elimination.
 
-    The last axis of a coefficient runs over what multiplies it: 1, -w^2, i w, +- w Omega.
+    The last axis of a coefficient runs over its factors: 1, -w^2, i w, +- w Omega.
     """
 
     diagonal: Vector  # [shape=(n, 2, 2, 4)] of node k with itself, forward plane
@@ -156,7 +156,7 @@ class _Chain:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of a line's receptance."""
+        """Shape of one line's receptance."""
         return self.responses.size, self.forces.size
 
 
@@ -208,7 +208,7 @@ def _node_blocks(matrix: csc_array, n_beam: int) -> tuple[Vector, Vector]:
 
 
 def _check_isotropic(blocks: Vector, name: str) -> None:
-    """Raise where the planes of a node without support differ or are coupled."""
+    """Raise if the planes of a node without support differ or are coupled."""
     bound = _ISOTROPY * np.abs(blocks).max(initial=0.0)
     apart = np.abs(blocks[:, :2, :2] - blocks[:, 2:, 2:]).max(initial=0.0)
     coupled = np.abs(blocks[:, :2, 2:]).max(initial=0.0)
@@ -216,7 +216,7 @@ def _check_isotropic(blocks: Vector, name: str) -> None:
         raise ValueError(
             f"the {name} of the shaft differs between its planes, or couples them, by "
             f"{max(apart, coupled):g} (bound {bound:g}) away from every support; "
-            "name a support where it does"
+            "name a support there"
         )
 
 
@@ -233,7 +233,7 @@ def _solve(chain: _Chain, omega: Vector, speed: Vector) -> tuple[Complex, Vector
     unit[chain.forces, np.arange(chain.forces.size)] = 1
     try:
         found = np.linalg.solve(dynamic, unit)[:, chain.responses]
-    except np.linalg.LinAlgError:  # on one of the lines: each for itself
+    except np.linalg.LinAlgError:  # singular on one of the lines: solve each separately
         return np.zeros((omega.size, *chain.shape), np.complex128), np.full(omega.size, math.inf)
     return np.asarray(found, dtype=np.complex128), growth
 
@@ -241,7 +241,7 @@ def _solve(chain: _Chain, omega: Vector, speed: Vector) -> tuple[Complex, Vector
 def _solve_pivoted(
     rotor: Rotor, rows: Index, columns: Index, hertz: float, speed: float
 ) -> Complex:
-    """Receptance at one line, by a factorisation of the whole that exchanges rows."""
+    """Receptance at one line, by a full factorisation with pivoting."""
     omega = 2 * math.pi * hertz
     dynamic = rotor.stiffness - omega**2 * rotor.mass + 1j * omega * rotor.damping(speed)
     unit = np.zeros((dynamic.shape[0], columns.size), dtype=np.complex128)
@@ -253,7 +253,7 @@ def _solve_pivoted(
 
 
 def _add_spans(dynamic: Complex, chain: _Chain, omega: Vector, speed: Vector) -> Vector:
-    """Add to the coordinates kept what the nodes between them do; the growth on each line."""
+    """Add the condensed spans to the coordinates kept; return the growth on each line."""
     signs = np.array([1.0, -1.0]) if speed.any() else np.array([1.0])
     factors = _span_factors(chain, omega, speed, signs)
     growth = np.zeros(omega.size)
@@ -273,7 +273,7 @@ def _add_spans(dynamic: Complex, chain: _Chain, omega: Vector, speed: Vector) ->
 def _span_factors(
     chain: _Chain, omega: Vector, speed: Vector, signs: Vector
 ) -> NDArray[np.inexact]:
-    """What multiplies a coefficient [shape=(4, n_signs, n_lines)]; real without damping."""
+    """Factors of the coefficients [shape=(4, n_signs, n_lines)]; real without damping."""
     damped = chain.diagonal[..., 2].any() or chain.following[..., 2].any()
     factors = np.zeros((4, signs.size, omega.size), dtype=complex if damped else float)
     factors[0] = 1
@@ -289,10 +289,10 @@ def _condense(
 ) -> tuple[NDArray[np.inexact], NDArray[np.inexact], NDArray[np.inexact], Vector]:
     """Eliminate the nodes between two, from left to right.
 
-    Each [shape=(2, 2, n_signs, n_lines)]: what is added to the left node, to the coupling of left
-    (rows) and right (columns), and to the right node. Then on each line the largest stiffness met
-    at the left over that of one element: where a part of the span resonates between clamped ends
-    without damping, its pivot vanishes, and as many digits go as this has.
+    Returns, each [shape=(2, 2, n_signs, n_lines)], the additions to the left node, to the coupling
+    of left (rows) and right (columns), and to the right node. Also, for each line, the largest
+    left-hand stiffness over that of one element: if a part of the span resonates between clamped
+    ends without damping, its pivot vanishes, and this ratio gives the lost digits.
     """
     at_left = np.zeros((2, 2, *factors.shape[1:]), dtype=factors.dtype)
     most = np.zeros(factors.shape[1:])
@@ -312,12 +312,12 @@ def _condense(
 
 
 def _product(a: NDArray[np.inexact], b: NDArray[np.inexact]) -> NDArray[np.inexact]:
-    """Of 2 x 2 matrices along the first two axes."""
+    """Product of 2 x 2 matrices along the first two axes."""
     return a[:, :1] * b[:1] + a[:, 1:] * b[1:]
 
 
 def _inverse(a: NDArray[np.inexact]) -> NDArray[np.inexact]:
-    """Of symmetric 2 x 2 matrices along the first two axes."""
+    """Inverse of symmetric 2 x 2 matrices along the first two axes."""
     inverse = np.empty_like(a)
     scale = 1 / (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])
     inverse[0, 0] = a[1, 1] * scale
@@ -328,7 +328,7 @@ def _inverse(a: NDArray[np.inexact]) -> NDArray[np.inexact]:
 
 
 def _both_planes(span: NDArray[np.inexact]) -> Complex:
-    """From u, v to y, slope_y, z, slope_z [shape=(n_lines, 4, 4)]."""
+    """Transform from u, v to y, slope_y, z, slope_z [shape=(n_lines, 4, 4)]."""
     forward, backward = span[:, :, 0], span[:, :, -1]
     whole = np.zeros((span.shape[-1], 4, 4), dtype=np.complex128)
     same = np.moveaxis((forward + backward) / 2, -1, 0)
@@ -340,7 +340,7 @@ def _both_planes(span: NDArray[np.inexact]) -> Complex:
 
 
 def _check_finite(values: Complex, hertz: Vector) -> None:
-    """Raise where a line has no answer."""
+    """Raise if a line has no solution."""
     lost = hertz[~np.isfinite(values).all(axis=(1, 2))]
     if lost.size:
         raise ValueError(
@@ -350,7 +350,7 @@ def _check_finite(values: Complex, hertz: Vector) -> None:
 
 
 def _check_restrained(rotor: Rotor) -> None:
-    """Raise where a static force meets no stiffness."""
+    """Raise if a static force meets no stiffness."""
     dense = rotor.stiffness.toarray()
     scale = np.sqrt(np.abs(dense.diagonal()))
     condition = np.linalg.cond(dense / scale / scale[:, None], 1) if scale.all() else math.inf

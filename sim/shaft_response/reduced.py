@@ -1,7 +1,7 @@
-"""A rotor reduced to free-free modes of its shaft, films and housings as they are.
+"""A rotor reduced to free-free modes of its shaft, with unreduced films and housings.
 
-With the residual flexibility at supports and forces the error of a receptance falls as the number
-of modes to the power -11, without it -3 (slender shaft, force at its end);
+With the residual flexibility at supports and forces, the error of a receptance falls with the
+number of modes to the power -11, without it -3 (slender shaft, force at its end);
 :meth:`ReducedRotor.measured_error` compares with the direct solution.
 """
 
@@ -20,12 +20,12 @@ from .places import Complex, Index, Place, Vector, checked_frequencies, checked_
 from .receptance import receptance
 
 LINES_AT_ONCE = 1024
-_RANK = 1e-10  # of the largest: flatter residual shapes repeat others
+_RANK = 1e-10  # of the largest: residual shapes of smaller rank are redundant
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeBasis:
-    """Shapes of one plane that a free shaft's motion is made of, the same for both planes.
+    """Basis of one plane for the motion of a free shaft, the same for both planes.
 
     Attributes
     ----------
@@ -33,11 +33,11 @@ class FreeBasis:
         In the order y, slope_y of every node; modes first, then residual shapes; of unit modal
         mass and orthogonal to one another [kg^-1/2].
     frequency_hz : numpy.ndarray [shape=(r,)]
-        Natural frequencies of the modes, then those that the residual shapes stand in for [Hz].
+        Natural frequencies of the modes, then those that the residual shapes represent [Hz].
     n_modes : int
-        How many are modes, the two rigid ones among them.
+        Number of modes, including the two rigid ones.
     limit_hz : float
-        Natural frequency of the first mode left out [Hz], inf where none is.
+        Natural frequency of the first omitted mode [Hz], inf if there is none.
     """
 
     shapes: Vector
@@ -55,17 +55,17 @@ def free_basis(
 ) -> FreeBasis:
     """Free-free modes of a shaft, and its residual flexibility at stations.
 
-    To be computed once for a shaft: films, housings and speed do not enter.
+    Independent of films, housings and speed: compute it once for a shaft.
 
     Parameters
     ----------
     beam : Beam
     limit_hz : float
-        Keep the modes up to here, the two rigid ones at least [Hz].
+        Highest natural frequency of the modes kept, in addition to the two rigid ones [Hz].
     stations : sequence of float
-        Where forces act on the shaft, supports first of all [m].
+        Stations of forces on the shaft, in particular of its supports [m].
     slopes : bool
-        Moments act there too, as of tilted films.
+        Whether moments act there too, as from tilted films.
 
     Raises
     ------
@@ -74,9 +74,9 @@ def free_basis(
 
     Notes
     -----
-    The residual shape of a force is the static deflection by the modes left out,
-    ``sum phi_k phi_k^T b / w_k^2``. The static answer is then exact for forces at these stations,
-    and what is left of a mode out is its share of ``(w / w_k)^4 / w_k^2``.
+    The residual shape of a force is the static deflection by the omitted modes,
+    ``sum phi_k phi_k^T b / w_k^2``. The static response is then exact for forces at these stations,
+    and the remaining error of an omitted mode is its share of ``(w / w_k)^4 / w_k^2``.
 
     References
     ----------
@@ -119,7 +119,7 @@ def _plane(matrix: csc_array, plane: Index) -> Vector:
 
 
 def _residual_shapes(omitted: Vector, squared: Vector, rows: Index) -> tuple[Vector, Vector]:
-    """Static deflections by omitted modes, made orthonormal, and what they stand for [rad2/s2]."""
+    """Static deflections by omitted modes, orthonormal, and their squared frequencies [rad2/s2]."""
     amplitude = omitted[rows].T / squared[:, None]  # of every omitted mode, per unit force
     scale = np.linalg.norm(amplitude, axis=0)
     amplitude = amplitude[:, scale > 0] / scale[scale > 0]
@@ -131,23 +131,23 @@ def _residual_shapes(omitted: Vector, squared: Vector, rows: Index) -> tuple[Vec
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedRotor:
-    """A rotor at one speed, on a free basis of its shaft; films and housings as they are.
+    """A rotor at one speed, on a free basis of its shaft, with unreduced films and housings.
 
     Attributes
     ----------
     rotor : Rotor
-        What was reduced.
+        The unreduced rotor.
     speed : float
-        [rad/s]
+        Shaft speed [rad/s].
     limit_hz : float
-        Natural frequency of the first free-free mode left out [Hz]; responses are good up to a
-        third of it or so, :meth:`measured_error` tells.
+        Natural frequency of the first free-free mode omitted [Hz]; responses are accurate up to
+        about a third of it, see :meth:`measured_error`.
     poles : numpy.ndarray [shape=(2 m,)]
-        Eigenvalues [rad/s], a negative real part for a motion that dies down.
+        Eigenvalues [rad/s], with negative real part for a decaying motion.
     shapes : numpy.ndarray [shape=(n_dof, 2 m)]
         Displacements of the rotor's coordinates.
     participation : numpy.ndarray [shape=(2 m, n_dof)]
-        Of forces in each, so that the receptance is ``shapes (s - poles)^-1 participation``.
+        Participation of forces, so that the receptance is ``shapes (s - poles)^-1 participation``.
     """
 
     rotor: Rotor
@@ -159,7 +159,7 @@ class ReducedRotor:
 
     @property
     def stable(self) -> bool:
-        """Every motion dies down."""
+        """Whether every motion decays."""
         return bool(self.poles.real.max() < 0)
 
     def receptance(
@@ -184,7 +184,7 @@ class ReducedRotor:
     ) -> float:
         """Largest deviation from the direct receptance, over the largest entry at the line.
 
-        All lines given are solved directly, so that a few are enough.
+        All lines are solved directly, so use only a few.
         """
         own = self.receptance(frequencies, responses, forces)
         exact = receptance(self.rotor, frequencies, responses, forces, speed=self.speed)
@@ -198,15 +198,15 @@ def reduce_rotor(rotor: Rotor, basis: FreeBasis, *, speed: float = 0.0) -> Reduc
     Parameters
     ----------
     rotor : Rotor
-        On the beam that the basis was made of; its supports may be any.
+        A rotor on the basis' beam, with any supports.
     basis : FreeBasis
     speed : float
-        Of the shaft [rad/s].
+        Shaft speed [rad/s].
 
     Raises
     ------
     ValueError
-        The basis is of another beam, or the speed is not finite.
+        The basis belongs to another beam, or the speed is not finite.
 
     Examples
     --------
@@ -246,13 +246,13 @@ def reduce_rotor(rotor: Rotor, basis: FreeBasis, *, speed: float = 0.0) -> Reduc
 
 
 def _transform(rotor: Rotor, basis: FreeBasis) -> Vector:
-    """From both planes' shapes and the housings to the rotor's coordinates."""
+    """Transformation from both planes' shapes and the housings to the rotor's coordinates."""
     n_plane, r = basis.shapes.shape
     n_beam = rotor.beam.n_dof
     if 2 * n_plane != n_beam:
         raise ValueError(
-            f"basis of {2 * n_plane} coordinates must be of the rotor's own beam, {n_beam}; "
-            "make it again with free_basis"
+            f"basis of {2 * n_plane} coordinates must match the rotor's beam, {n_beam}; "
+            "rebuild it with free_basis"
         )
     n = rotor.mass.shape[0]
     transform = np.zeros((n, 2 * r + n - n_beam))

@@ -14,9 +14,9 @@ from .receptance import receptance
 from .reduced import LINES_AT_ONCE, ReducedRotor
 
 QUANTITIES = ("displacement", "velocity", "acceleration")
-"""Of a response, in the order of their derivatives."""
+"""Quantities of a response, in the order of their derivatives."""
 
-_NOTHING = 1e-16  # of the largest at the start
+_NOTHING = 1e-16  # of the largest value at the start
 
 
 # --- steady and transient forces
@@ -31,8 +31,8 @@ class Harmonic:
     frequency : float
         [Hz]; zero for a steady force.
     forces : mapping of place to complex
-        Amplitudes [N], [N m]. A force that turns with the shaft has -i times along z what it has
-        along y.
+        Amplitudes [N], [N m]. A force that rotates with the shaft has -i times its y amplitude
+        along z.
     """
 
     frequency: float
@@ -41,12 +41,12 @@ class Harmonic:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Broadband:
-    """A Gaussian random force, the same at all its places; others are independent of it.
+    """A Gaussian random force, identical at all its places and independent of others.
 
     Attributes
     ----------
     frequencies : array-like [shape=(m,)]
-        Rising, [Hz].
+        In rising order [Hz].
     density : array-like [shape=(m,)]
         One-sided power spectral density at these, linear between them and zero outside
         [N^2/Hz].
@@ -66,7 +66,7 @@ class Transient:
     Attributes
     ----------
     samples : array-like [shape=(n_samples,)]
-        [N], at the sample rate of the response; band-limited between them.
+        Force [N], at the sample rate of the response; band-limited between samples.
     forces : mapping of place to float
         Share at each place.
     """
@@ -90,7 +90,7 @@ def harmonic_response(
     harmonics : sequence of Harmonic
     responses : sequence of place
     speed : float, optional
-        Of the shaft [rad/s]; by default 0, or that of the reduced rotor.
+        Shaft speed [rad/s]; by default 0, or that of the reduced rotor.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def harmonic_response(
     Raises
     ------
     ValueError
-        As of :func:`receptance`; or a reduced rotor is asked at another speed than its own.
+        As in :func:`receptance`; or the speed differs from that of a reduced rotor.
     """
     if not harmonics:
         return np.zeros((0, len(responses)), dtype=np.complex128)
@@ -138,12 +138,12 @@ def time_response(
     transients: Sequence[Transient] = (),
     seed: int = 0,
 ) -> Vector:
-    """Motion about the equilibrium under forces of three kinds, added.
+    """Motion about the equilibrium under the sum of three kinds of forces.
 
     Parameters
     ----------
     reduced : ReducedRotor
-        Of :func:`reduce_rotor`.
+        Result of :func:`reduce_rotor`.
     responses : sequence of place
     n_samples : int
         At least 2.
@@ -152,13 +152,13 @@ def time_response(
     quantity : str or sequence of str [shape=(n_resp,)]
         *displacement*, *velocity* or *acceleration*, one for all or one for each response.
     harmonics : sequence of Harmonic
-        In their steady state: on since long before the first sample.
+        In steady state: acting since long before the first sample.
     broadband : sequence of Broadband
-        In theirs too.
+        Also in steady state.
     transients : sequence of Transient
         From rest at the first sample on.
     seed : int
-        Of the random forces.
+        Seed of the random forces.
 
     Returns
     -------
@@ -173,13 +173,13 @@ def time_response(
 
     Notes
     -----
-    Nothing is stepped: each line of the forces' spectra is multiplied by the reduced rotor's
-    transfer function, so that a response is exact for forces that are band-limited. Random forces
-    are drawn a quarter longer than the record, which is cut out and so is not periodic. A transient
-    is first taken to repeat for ever; from that motion goes what each mode would do freely with
-    the modal coordinate it has at the first sample, and what is left starts from rest. A transient
-    that starts or ends with a jump rings at half the sample rate around it, as its band-limited
-    self does.
+    There is no time stepping: each line of the forces' spectra is multiplied by the reduced rotor's
+    transfer function, so that a response is exact for band-limited forces. Random forces
+    are drawn a quarter longer than the record, which is cut from them and so is not periodic. A
+    transient is first treated as periodic; then the free motion of each mode from its modal
+    coordinate at the first sample is subtracted, so that the remaining motion starts from rest. A
+    transient that starts or ends with a jump rings there at half the sample rate, like its
+    band-limited version.
 
     Examples
     --------
@@ -261,7 +261,7 @@ def _broadband_part(
 def _random_spectrum(
     source: Broadband, hertz: Vector, n: int, sample_rate: float, rng: np.random.Generator
 ) -> Complex:
-    """Of a real Gaussian force [N], as rfft has it; the mean is left out."""
+    """Spectrum of a real Gaussian force [N] in rfft's layout, without the mean."""
     at = np.asarray(source.frequencies, dtype=float)
     given = np.asarray(source.density, dtype=float)
     density = np.interp(hertz, at, given, left=0.0, right=0.0)
@@ -333,7 +333,7 @@ def _through(
     rows: Index,
     orders: Index,
 ) -> tuple[Complex, Complex]:
-    """Response to forces that repeat after n samples; lines without force cost nothing.
+    """Response to forces that repeat after n samples; lines without force are skipped.
 
     Spectra of the responses [shape=(n_resp, n_lines)], and modal coordinates at the first sample
     [shape=(2 m,)].
@@ -343,7 +343,7 @@ def _through(
     shapes = reduced.shapes[rows].T
     half = np.zeros(reduced.poles.size, dtype=np.complex128)  # from the lines above zero
     weight = np.ones(s.size)
-    weight[0] = 0.5  # zero and half the sample rate stand for both sides
+    weight[0] = 0.5  # zero and half the sample rate count for both sides
     if n % 2 == 0:
         weight[-1] = 0.5
     busy = np.flatnonzero(spectra.any(axis=0))
@@ -357,7 +357,7 @@ def _through(
 
 
 def _partners(poles: Complex) -> Index:
-    """Index of each one's conjugate; those of a real matrix come in pairs, the upper first."""
+    """Index of each pole's conjugate; those of a real matrix come in pairs, the upper first."""
     return np.arange(poles.size) + np.sign(poles.imag).astype(np.int64)
 
 
@@ -365,7 +365,7 @@ def _partners(poles: Complex) -> Index:
 
 
 def _orders(quantity: str | Sequence[str], n: int) -> Index:
-    """How often to derive each displacement."""
+    """Number of derivatives of each displacement."""
     names = [quantity] * n if isinstance(quantity, str) else list(quantity)
     if len(names) != n or not set(names) <= set(QUANTITIES):
         raise ValueError(
@@ -403,7 +403,7 @@ def _record_faults(reduced: ReducedRotor, n_samples: int, sample_rate: float) ->
         yield (
             f"growth rate = {worst.real:.3g} 1/s of the motion at "
             f"{abs(worst.imag) / 2 / math.pi:.3g} Hz must be < 0: the shaft whirls in its films, "
-            "or nothing holds it; change speed, load or film, or add a support"
+            "or has no support; change speed, load or film, or add a support"
         )
 
 
