@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.shaft_parts import LocalMode
-from wearstate.sim.shaft.local_modes import heard_locally
+from wearstate.sim.shaft.local_modes import local_acceleration
 
 CAP = LocalMode(frequency=60.0, damping_ratio=0.05, share=0.3)
 COVER = LocalMode(frequency=140.0, damping_ratio=0.02, share=-0.2)
@@ -36,14 +36,14 @@ def marched(mode, time):
 def test_the_sensor_hears_what_the_equation_of_motion_says():
     time = np.arange(4000) / RATE
     expected = shake(time) + sum(mode.share * marched(mode, time) for mode in (CAP, COVER))
-    heard = heard_locally(shake(time), (CAP, COVER), RATE)
+    heard = local_acceleration(shake(time), (CAP, COVER), RATE)
     settled = slice(1500, -1500)  # 0.75 s: exp(-0.75 / 0.053) of what each way begins with
     assert_allclose(heard[settled], expected[settled], atol=2e-5)
 
 
 def test_a_recording_begins_as_loud_as_it_goes_on():
     rows = np.random.default_rng(0).standard_normal((400, 2000))
-    heard = np.array([heard_locally(row, (COVER,), RATE) - row for row in rows])
+    heard = np.array([local_acceleration(row, (COVER,), RATE) - row for row in rows])
     first, later = (np.mean(heard[:, part] ** 2) for part in (slice(0, 10), slice(500, 1500)))
     assert first == pytest.approx(later, rel=0.25)  # 400 phases of one mode; from rest 0.03
 
@@ -51,7 +51,7 @@ def test_a_recording_begins_as_loud_as_it_goes_on():
 def test_no_share_leaves_every_bit():
     silent = [LocalMode(frequency=400.0, damping_ratio=0.03)]
     row = shake(np.arange(100) / RATE)
-    assert heard_locally(row, silent, RATE) is row
+    assert local_acceleration(row, silent, RATE) is row
 
 
 def test_a_mode_is_heard_by_its_own_sensor_alone():
