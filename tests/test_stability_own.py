@@ -92,7 +92,7 @@ def test_accuracy_ends_before_stability_and_both_are_told():
 def test_the_nearest_of_four_ways_is_told_first_in_whatever_direction():
     def judge(x, y):
         if y < 0.5:
-            return Verdict.WHIRL, "late motion 3 of the early"
+            return Verdict.WHIRL, "late motion 3 times the early motion"
         return (Verdict.UNSTABLE, "grows") if x > 5.0 else (Verdict.ACCURATE, "")
 
     text = conclusion(with_edges(measure(plan_of(judge))))
@@ -105,7 +105,7 @@ def test_the_nearest_of_four_ways_is_told_first_in_whatever_direction():
 def test_a_scene_that_is_bad_itself_is_told_so_with_the_way_out():
     text = conclusion(with_edges(measure(plan_of(ends_at(0.5, Verdict.INACCURATE, "off by 0.3")))))
     assert "inaccurate (numerical cause), off by 0.3." in text
-    factor = float(re.search(r"nearest that is accurate: ([\d.]+) times this step", text)[1])
+    factor = float(re.search(r"earest accurate cell: ([\d.]+) times this step", text)[1])
     assert 0.5 / 1.17 <= factor <= 0.5
 
 
@@ -173,7 +173,7 @@ def test_the_budget_goes_to_the_scene_and_its_own_methods_first(monkeypatch):
 
     own, aside = (replace(plan_of(None), name=name) for name in ("own", "aside"))
     own = replace(own, judges={"other": noted("other"), "own": noted("own")})
-    aside = replace(aside, judges={"other": noted("far"), "own": noted("aside")}, aside=True)
+    aside = replace(aside, judges={"other": noted("far"), "own": noted("aside")}, secondary=True)
     scene = load_scene("bilge-pump")
     makers = {"aside": lambda *_: aside, "own": lambda *_: own}
     monkeypatch.setitem(MAPS, scene.machine, makers)

@@ -1,4 +1,4 @@
-"""Where numerical methods fail: maps, theory, and where a scene lies in them.
+"""Limits of the numerical methods: maps, theory, and the position of a scene in them.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.contact``, ``sim.film``,
 ``sim.bearing``, ``sim.piping``, ``sim.mechanism``, ``sim.pump_setup``, ``sim.pump``,

@@ -1,7 +1,7 @@
-"""All maps of a scene under one budget: what the scene is computed with comes first.
+"""All maps of a scene under one time budget, its own methods first.
 
-First row and column of the scene in the panels of its own methods, and how far the next failure
-is; then the planes of these panels; then the methods that it is not computed with.
+The order is: row and column of the scene in the panels of its own methods, with the distance to the
+next failure; then the whole planes of these panels; then the methods that the scene does not use.
 """
 
 import time
@@ -19,32 +19,32 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class _Stage:
-    """A share of the work on all maps.
+    """A stage of the work on all maps.
 
     Attributes
     ----------
-    aside : bool or None
-        Maps that it is for: of the scene's own physics, of others, or all.
+    secondary : bool or None
+        Which maps it covers: False for methods of the scene, True for others, None for all.
     own : bool
         Only the panel of the scene's own method.
     cross : bool
         Only row and column of the scene, and the edges in them.
     """
 
-    aside: bool | None
+    secondary: bool | None
     own: bool
     cross: bool
 
     def covers(self, plan: MapPlan) -> bool:
-        """Whether it has anything to do in a map."""
-        return self.aside in (None, plan.aside) and (plan.own is not None or not self.own)
+        """Whether the stage applies to a map."""
+        return self.secondary in (None, plan.secondary) and (plan.own is not None or not self.own)
 
     def methods(self, plan: MapPlan) -> list[str]:
-        """Panels."""
+        """Methods whose panels are run."""
         return [plan.own.method] if self.own and plan.own else list(plan.judges)
 
     def done(self, found: StabilityMap) -> bool:
-        """Whether none of its cells is left."""
+        """Whether all cells of the stage have been run."""
         cells = found.plan.cross if self.cross else None
         return all(
             all(codes[c] != Verdict.NOT_RUN for c in cells) if cells is not None else codes.all()
@@ -52,7 +52,7 @@ class _Stage:
         )
 
     def run(self, found: StabilityMap, budget: Budget, progress: Progress | None) -> StabilityMap:
-        """Its cells of a map, as far as the budget goes."""
+        """Run the cells of the stage in a map, within the budget."""
         plan = found.plan
         cells = plan.cross if self.cross else None
         found = measure(
@@ -62,12 +62,12 @@ class _Stage:
 
 
 _STAGES = (
-    _Stage(aside=False, own=True, cross=True),
-    _Stage(aside=True, own=True, cross=True),
-    _Stage(aside=False, own=True, cross=False),
-    _Stage(aside=None, own=False, cross=False),
+    _Stage(secondary=False, own=True, cross=True),
+    _Stage(secondary=True, own=True, cross=True),
+    _Stage(secondary=False, own=True, cross=False),
+    _Stage(secondary=None, own=False, cross=False),
 )
-"""In the order in which the budget goes to them."""
+"""Stages in the order in which they receive the budget."""
 
 
 def atlas(
@@ -84,25 +84,25 @@ def atlas(
     ----------
     scene : Scene
     name : str, optional
-        Of a map of this machine.
+        Name of a map of this machine.
     budget : float, optional
-        Seconds in all. It goes to the scene's own row and column first, then to its own methods,
-        then to the others; at each stage every map gets an even share of what is left, and those
-        that it cuts short go on with what the others leave.
+        Total time [s]. It goes to the scene's own row and column first, then to its own methods,
+        then to the others. At each stage every map gets an equal share of the remaining time, and
+        unfinished maps use what the others leave.
     size : int, optional
-        Cells along either axis; each map has its own.
+        Cells along either axis; each map has its own default.
     progress : callable, optional
-        ``(done, all)`` of the map that runs.
+        Called with (done, all) of the running map.
 
     Returns
     -------
     tuple of StabilityMap
-        With the edges about the scene.
+        Maps with the edges around the scene.
 
     Raises
     ------
     SceneError
-        The machine has no such map, or the scene nothing to draw in it.
+        The machine has no such map, or the map does not apply to the scene.
     """
     makers = MAPS.get(scene.machine, {})
     if not makers:
@@ -125,7 +125,7 @@ def atlas(
 
 
 def _completed(found: StabilityMap, budget: Budget) -> StabilityMap:
-    """Edges again where the way to one of them was not run when they were sought."""
+    """Determine the edges again if not all cells up to them had been run."""
     sought = bool(found.edges) and all(edge.whole for edge in found.edges)
     return found if sought else with_edges(found, budget)
 
@@ -133,7 +133,7 @@ def _completed(found: StabilityMap, budget: Budget) -> StabilityMap:
 def _spend(
     stage: _Stage, found: dict[str, StabilityMap], end: float | None, progress: Progress | None
 ) -> None:
-    """One round of a stage: an even share of what is left for every map that is not done."""
+    """One round of a stage: an equal share of the remaining time for every unfinished map."""
     waiting = [
         name for name, each in found.items() if stage.covers(each.plan) and not stage.done(each)
     ]
@@ -143,7 +143,7 @@ def _spend(
 
 
 def _plans(scene: Scene, names: Sequence[str], size: int | None) -> list[MapPlan]:
-    """Those that the scene has something to draw in; of one alone, its refusal is an error."""
+    """Plans of the maps that apply to the scene; raise if the only one does not."""
     plans = []
     for name in names:
         plan = MAPS[scene.machine][name](scene, size)

@@ -1,7 +1,7 @@
-"""From a scene to the next failure of its own method: edges of a map, and what follows from them.
+"""Distance from a scene to the next failure of its own method: edges of a map, and conclusions.
 
-An edge is first seen between two cells of the scene's row or column and then halved until it is
-known to a few per cent. What the words say is the last value that was still good.
+An edge is located between two cells of the scene's row or column and then bisected until it is
+known to a few per cent. Texts state the last value that was still good.
 """
 
 import math
@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from .method_map import Budget, Edge, MapAxis, Own, StabilityMap, Verdict
 
-_HALVINGS = 3  # of an edge between two cells a factor of 1.8 apart: known to 7 per cent
-_WORTH_A_WORD = 1.1
+_HALVINGS = 3  # of an interval between cells a factor of 1.8 apart: leaves 7 per cent
+_LEAST_FACTOR = 1.1
 _KNOCKING = {Verdict.LOST, Verdict.CHAOTIC}
 _BAD = {Verdict.INACCURATE, Verdict.UNSTABLE, Verdict.NOT_CONVERGED, Verdict.REFUSED}
 _BAD |= {Verdict.WHIRL, Verdict.FAILS}
@@ -19,18 +19,18 @@ _SEEN_STABLE = {Verdict.ACCURATE, Verdict.INACCURATE, *_KNOCKING}
 
 
 def with_edges(found: StabilityMap, budget: Budget | None = None) -> StabilityMap:
-    """A map with the edges about its scene, as far as its cells are run.
+    """Add the edges around the scene to a map, as far as its cells have been run.
 
     Parameters
     ----------
     found : StabilityMap
     budget : Budget, optional
-        What it leaves no time for stays as wide as the cells are apart.
+        Edges beyond the budget are known only to the distance of the cells.
 
     Returns
     -------
     StabilityMap
-        Edges each way along both axes; where accuracy ends before stability, of both.
+        Edges in both directions along both axes; two if accuracy ends before stability.
     """
     start = start_cell(found)
     if start is None:
@@ -45,9 +45,9 @@ def with_edges(found: StabilityMap, budget: Budget | None = None) -> StabilityMa
 
 
 def start_cell(found: StabilityMap) -> tuple[int, int] | None:
-    """Cell from which edges are sought: that of the scene, once it is run.
+    """Cell from which edges are searched: that of the scene, once it has been run.
 
-    Where the scene has a value on one axis only it is the middle of the longest accurate run.
+    If the scene has a value on one axis only, it is the middle of the longest accurate run.
     """
     plan = found.plan
     if plan.own is None:
@@ -70,7 +70,7 @@ def _middle_of_the_good(found: StabilityMap, own: Own) -> tuple[int, int] | None
 
 
 def _open_axes(own: Own | None) -> list[str]:
-    """Axes along which there is something to go; a scene on one axis stays on it."""
+    """Axes along which edges are searched; a scene with a value on one axis keeps that value."""
     if own is None:
         return []
     if own.x is None or own.y is None:
@@ -85,10 +85,10 @@ def _edges(
     rising: bool,
     budget: Budget | None,
 ) -> Iterator[Edge]:
-    here = Verdict(found.verdicts[_method(found)][start])
-    edge = _edge(found, start, axis, rising, _as_good_as(here), budget)
+    own = Verdict(found.verdicts[_method(found)][start])
+    edge = _edge(found, start, axis, rising, _equivalent(own), budget)
     yield edge
-    if here not in _BAD and edge.verdict is Verdict.INACCURATE:
+    if own not in _BAD and edge.verdict is Verdict.INACCURATE:
         yield _edge(found, start, axis, rising, _SEEN_STABLE, budget)
 
 
@@ -97,11 +97,11 @@ def _method(found: StabilityMap) -> str:
     return found.plan.own.method
 
 
-def _as_good_as(here: Verdict) -> set[Verdict]:
-    """Verdicts that are no change: a knocking pump may knock in another way, or not at all."""
-    if here in _BAD:
+def _equivalent(own: Verdict) -> set[Verdict]:
+    """Verdicts that do not count as a change: a knocking pump may knock differently or not."""
+    if own in _BAD:
         return _BAD
-    return {here, Verdict.ACCURATE, *(_KNOCKING if here in _KNOCKING else ())}
+    return {own, Verdict.ACCURATE, *(_KNOCKING if own in _KNOCKING else ())}
 
 
 def _edge(
@@ -112,7 +112,7 @@ def _edge(
     same: set[Verdict],
     budget: Budget | None,
 ) -> Edge:
-    """Walk from the start to the first cell with another verdict, then halve the way between."""
+    """Go from the start to the first cell with another verdict, then bisect the interval."""
     plan, codes = found.plan, found.verdicts[_method(found)]
     values = (plan.x if axis == "x" else plan.y).values
     place = start[1] if axis == "x" else start[0]
@@ -177,12 +177,12 @@ def _between(axis: MapAxis, one: float, other: float) -> float:
 
 
 def conclusion(found: StabilityMap) -> str:
-    """What a map says of its scene, in a sentence or two.
+    """Conclusion of a map for its scene, in a sentence or two.
 
     Parameters
     ----------
     found : StabilityMap
-        With its edges.
+        Map with its edges.
 
     Returns
     -------
@@ -196,8 +196,8 @@ def conclusion(found: StabilityMap) -> str:
         return f"{_where(found)} nothing is accurate."
     if start is None:
         return "The budget ended before the cell of this scene was run."
-    here = Verdict(found.verdicts[own.method][start])
-    parts = [_as_written(found, start, here), _distance(found, here)]
+    verdict = Verdict(found.verdicts[own.method][start])
+    parts = [_as_written(found, start, verdict), _distance(found, verdict)]
     if not _run(found, found.plan.cross):
         parts.append("The budget ended before all of the scene's row and column were run.")
     return " ".join(part for part in (*parts, own.note) if part)
@@ -209,41 +209,41 @@ def _run(found: StabilityMap, cells: list[tuple[int, int]]) -> bool:
 
 
 def _where(found: StabilityMap) -> str:
-    """The value that the scene has on its one axis."""
+    """Value of the scene on its only axis, in words."""
     plan, own = found.plan, found.plan.own
     assert own is not None
     axis, value = (plan.y, own.y) if own.x is None else (plan.x, own.x)
     return f"At this scene's {axis.quantity} = {axis.written(value or 0.0)}"
 
 
-def _as_written(found: StabilityMap, start: tuple[int, int], here: Verdict) -> str:
+def _as_written(found: StabilityMap, start: tuple[int, int], verdict: Verdict) -> str:
     plan = found.plan
     if plan.cell is None:
         axis = plan.x if plan.own is not None and plan.own.x is None else plan.y
         ends = " to ".join(axis.written(e.inside) for e in reversed(found.edges[:2]))
         return f"{_where(found)} this method is accurate for {axis.quantity} = {ends}."
-    word = found.words[_method(found)][start[0]][start[1]] if here is not Verdict.ACCURATE else ""
     i, j = start
+    word = "" if verdict is Verdict.ACCURATE else found.words[_method(found)][i][j]
     return (
         f"As written ({plan.x.quantity} {plan.x.written(plan.x.values[j])}, "
-        f"{plan.y.quantity} {plan.y.written(plan.y.values[i])}): {here.text}"
+        f"{plan.y.quantity} {plan.y.written(plan.y.values[i])}): {verdict.text}"
         f"{_why(word)}."
     )
 
 
 def _why(word: str) -> str:
-    """A word on a cell for a sentence: without the name of its status, and without the cure."""
+    """Explanation of a cell for use in a sentence, without the name of its status and the cure."""
     name, sign, text = word.partition(": ")
     short = (text if sign and name.isidentifier() else word).partition(";")[0]
     return f", {short}" if short else ""
 
 
-def _distance(found: StabilityMap, here: Verdict) -> str:
+def _distance(found: StabilityMap, verdict: Verdict) -> str:
     if found.plan.cell is None:
         return ""
     ends = [edge for edge in found.edges if edge.verdict is not Verdict.NOT_RUN]
-    if here in _BAD:
-        return _way_out(found, ends)
+    if verdict in _BAD:
+        return _nearest_other(found, ends)
     if not ends:
         return f"No failure found: {_ranges(found, _first_ones(found))}."
     nearest = min(ends, key=lambda edge: _ratio(found, edge))
@@ -258,25 +258,25 @@ def _distance(found: StabilityMap, here: Verdict) -> str:
 
 
 def _first_ones(found: StabilityMap) -> list[Edge]:
-    """The first edge each way, where there is a way to go."""
+    """First edge in each direction; without directions that end at the scene."""
     kept: dict[tuple[str, bool], Edge] = {}
     for edge in found.edges:
-        told = edge.verdict is not Verdict.NOT_RUN or not edge.whole
-        if told or _goes_on(factor_of(found, edge)):
+        informative = edge.verdict is not Verdict.NOT_RUN or not edge.whole
+        if informative or _is_notable(factor_of(found, edge)):
             kept.setdefault((edge.axis, edge.rising), edge)
     return list(kept.values())
 
 
-def _goes_on(factor: float) -> bool:
-    """Whether the way to the end of an axis is worth a word: a map may end at the scene."""
-    return max(factor, 1 / factor) > _WORTH_A_WORD
+def _is_notable(factor: float) -> bool:
+    """Whether the end of an axis is far enough to be mentioned: a map may end at the scene."""
+    return max(factor, 1 / factor) > _LEAST_FACTOR
 
 
-def _way_out(found: StabilityMap, ends: list[Edge]) -> str:
+def _nearest_other(found: StabilityMap, ends: list[Edge]) -> str:
     if not ends:
-        return f"Nothing better found: {_ranges(found, found.edges)}."
+        return f"No better value found: {_ranges(found, found.edges)}."
     nearest = min(ends, key=lambda edge: _ratio(found, edge))
-    return f"The nearest that is {nearest.verdict.text}: {_times(found, nearest, nearest.outside)}."
+    return f"Nearest {nearest.verdict.text} cell: {_times(found, nearest, nearest.outside)}."
 
 
 def _ranges(found: StabilityMap, edges: list[Edge] | tuple[Edge, ...]) -> str:
@@ -309,7 +309,7 @@ def _own_value(found: StabilityMap, edge: Edge) -> float:
 
 
 def factor_of(found: StabilityMap, edge: Edge) -> float:
-    """Last good value of an edge over that of the scene; NaN where the scene has none."""
+    """Last good value of an edge over that of the scene; NaN if the scene has none."""
     return edge.inside / _own_value(found, edge)
 
 

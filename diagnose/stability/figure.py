@@ -1,8 +1,8 @@
 """Maps of :mod:`.method_map` as pictures: regions as colours and symbols, theory as lines.
 
-No two verdicts share a symbol, so that a map is read without its colours. Strokes have a numerical
-cause, closed shapes a physical one. The scene itself is a diamond, or a line where it has a value
-on one axis only.
+No two verdicts share a symbol, so that a map can be read without colours. Strokes mark a numerical
+cause, closed shapes a physical one. The scene itself is a diamond, or a line if it has a value on
+one axis only.
 """
 
 import math
@@ -43,19 +43,19 @@ SYMBOL = {
     Verdict.WHIRL: "o",
     Verdict.FAILS: "s",
 }
-"""Marker of every verdict; the two without one are told apart by white and green."""
+"""Marker of every verdict; the two without a marker differ by colour, white and green."""
 
-_DARK = {Verdict.UNSTABLE, Verdict.WHIRL, Verdict.FAILS}  # bear white symbols
+_DARK = {Verdict.UNSTABLE, Verdict.WHIRL, Verdict.FAILS}  # have white symbols
 _INK = "#1c232b"
 
 COLUMNS = 3
 """Panels in a row."""
 
 _PANEL = (3.3, 3.0)  # inches
-_HEAD, _FOOT = 0.5, 0.75  # inches of a map for its title and legend
+_HEAD, _FOOT = 0.5, 0.75  # inches for title and legend of a map
 _NARROWEST = 7.5
 _DECADES = 300
-"""Range of an axis, end over end, below which 1, 2 and 5 are marked in each decade."""
+"""Ratio of the ends of an axis below which 1, 2 and 5 are marked in each decade."""
 
 _LINES: tuple[dict[str, Any], ...] = (
     {"color": "black", "lw": 1.8},
@@ -81,13 +81,13 @@ def save_figure(
     Raises
     ------
     DataError
-        Another suffix.
+        The suffix is none of these.
     """
     save_picture(atlas_figure(scene, maps), path, force=force)
 
 
 def atlas_figure(scene: Scene, maps: Sequence[StabilityMap]) -> Any:
-    """Figure of maps: a panel for every method, that of the scene first, a legend for each map.
+    """Figure of maps: a panel per method, that of the scene first, and a legend per map.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def atlas_figure(scene: Scene, maps: Sequence[StabilityMap]) -> Any:
 
 
 def map_images(found: StabilityMap) -> list[tuple[str, PageImage]]:
-    """Each panel of a map as a picture of a page, with its method, and last its legend."""
+    """Panels of a map as pictures for a page, each with its method; the last is the legend."""
     from matplotlib.figure import Figure
 
     images = []
@@ -128,7 +128,7 @@ def map_images(found: StabilityMap) -> list[tuple[str, PageImage]]:
 
 
 def _legend_figure(found: StabilityMap, lines: Mapping[str, Any]) -> Any:
-    """What colours, symbols and lines mean, one below the other in two columns."""
+    """Legend of colours, symbols and lines, in two columns."""
     from matplotlib.figure import Figure
 
     handles, labels = _meanings(found, lines)
@@ -157,7 +157,7 @@ def _draw(sheet: Any, scene: Scene, found: StabilityMap) -> None:
 
 
 def _fill(panel: Any, found: StabilityMap, method: str, lines: dict[str, Any]) -> None:
-    """One method: its verdicts, the scene, and theory, whose lines are noted by name."""
+    """Draw one method: verdicts, scene and theory, whose lines are added to `lines` by name."""
     plan = found.plan
     _draw_panel(panel, plan, found.verdicts[method])
     _draw_own(panel, plan)
@@ -168,7 +168,7 @@ def _fill(panel: Any, found: StabilityMap, method: str, lines: dict[str, Any]) -
 
 
 def _name(panel: Any, plan: MapPlan, method: str) -> None:
-    """Title of a panel; that of the scene's own method is bold, in a heavy frame."""
+    """Set the title of a panel; that of the scene's own method is bold, with a heavy frame."""
     if plan.own is None or plan.own.method != method:
         panel.set_title(method, fontsize=9)
         return
@@ -221,7 +221,7 @@ def _symbol_style(verdict: Verdict, size: float) -> dict[str, Any]:
 
 
 def _draw_own(panel: Any, plan: MapPlan) -> None:
-    """Diamond at the scene's cell, or a line at its one value; both with their name."""
+    """Draw a diamond at the scene's cell, or a line at its only value, with a label."""
     own = plan.own
     if own is None:
         return
@@ -241,7 +241,7 @@ _OWN_LINE: dict[str, Any] = {"color": "black", "lw": 1.6, "ls": "-.", "zorder": 
 
 
 def _tag(panel: Any, x: float, y: float, plan: MapPlan) -> None:
-    """Name of the scene beside its marker, towards the middle of the map."""
+    """Write the label of the scene next to its marker, towards the middle of the map."""
     right = plan.x.values.index(x) < len(plan.x.values) / 2
     below = plan.y.values.index(y) >= len(plan.y.values) / 2
     panel.annotate(
@@ -262,14 +262,14 @@ def _decade_ticks(axis: MapAxis, ticks: Any) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     ticks.set_major_formatter(FuncFormatter(lambda value, _: _decade(value)))
-    ticks.set_minor_formatter(NullFormatter())  # decades say enough, where there are several
+    ticks.set_minor_formatter(NullFormatter())  # several decades need no further labels
     if axis.values[-1] < _DECADES * axis.values[0]:
         ticks.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ticks.set_major_formatter("{x:g}")
 
 
 def _decade(value: float) -> str:
-    """A power of ten without a raised exponent, which would be too small to read.
+    """A power of ten without superscript, which would be too small to read.
 
     Examples
     --------
@@ -283,7 +283,7 @@ def _decade(value: float) -> str:
 
 
 def _bounds(axis: MapAxis) -> NDArray[np.float64]:
-    """Edges of the cells about the values of an axis."""
+    """Edges of the cells around the values of an axis."""
     values = np.log(axis.values) if axis.log else np.asarray(axis.values)
     middle = 0.5 * (values[1:] + values[:-1])
     edges = np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
@@ -297,14 +297,14 @@ def _legend(sheet: Any, found: StabilityMap, lines: Mapping[str, Any]) -> None:
 
 
 def _together() -> dict[type, Any]:
-    """A patch and its symbol are one entry of a legend."""
+    """Legend handler that merges a patch and its symbol into one entry."""
     from matplotlib.legend_handler import HandlerTuple
 
     return {tuple: HandlerTuple(ndivide=1)}
 
 
 def _meanings(found: StabilityMap, lines: Mapping[str, Any]) -> tuple[list[Any], list[str]]:
-    """Entries of the legend: verdicts that occur, then lines of theory."""
+    """Entries of the legend: occurring verdicts, then lines of theory."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -28,12 +28,12 @@ from .own_point import GAP_LEFT, changed, outcome, own_film, plain_film
 
 
 def _film_method(scene: Scene) -> str:
-    """Panel of the solver of a scene's film: maps are drawn from direct solves."""
+    """Panel of the solver of a scene's film; film maps are tabulated from direct solves."""
     return "short" if isinstance(scene, JournalScene) and scene.film.rung == "short" else "direct"
 
 
 def _meshed(geometry: FilmGeometry, n_theta: int, n_z: int | None = None) -> FilmGeometry:
-    """The same film on another mesh, a quarter as many nodes over the length if not told."""
+    """The same film on another mesh; by default a quarter as many nodes over the length."""
     return FilmGeometry(
         length_to_diameter=geometry.length_to_diameter,
         n_theta=n_theta,
@@ -42,7 +42,7 @@ def _meshed(geometry: FilmGeometry, n_theta: int, n_z: int | None = None) -> Fil
     )
 
 
-_FINE = (432, 65)  # nodes of the film that decides what is right
+_FINE = (432, 65)  # nodes of the reference film
 _SWEEPS = 6000
 _RUNG = {rung.name: rung for rung in FILM_RUNGS}
 
@@ -53,14 +53,14 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
     Parameters
     ----------
     scene : Scene
-        A journal bearing, or a shaft line, of which the aftmost bearing is taken.
+        A journal bearing, or a shaft line, whose aftmost bearing is used.
     size : int, optional
         Cells along either axis.
 
     Returns
     -------
-    Plan or str
-        Or why there is none.
+    MapPlan or str
+        The plan, or why there is none.
     """
     geometry = plain_film(scene)
     n, own = size or 10, own_film(scene)
@@ -96,13 +96,13 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
         note=f"force within {scene.accuracy:.2g} of a direct solve on {_FINE[0]} x {_FINE[1]} "
         "nodes",
         own=Own(method=_film_method(scene), x=float(geometry.n_theta), y=own.gap, note=own.note),
-        aside=isinstance(scene, ShaftScene),
+        secondary=isinstance(scene, ShaftScene),
     )
 
 
 def _nodes(values: Sequence[int]) -> MapAxis:
     return MapAxis(
-        name="mesh, nodes round the circle",
+        name="mesh, nodes around the circumference",
         unit="",
         values=tuple(float(v) for v in values),
         even=True,
@@ -116,7 +116,7 @@ def _relaxed(
 
 
 def _cells_curve(gaps: tuple[float, ...]) -> Curve:
-    """Mesh with as many nodes in the narrow gap as the guard asks for."""
+    """Mesh with as many nodes in the narrow gap as the guard requires."""
     y = [float(gap) for gap in np.geomspace(gaps[0] / 2, 0.45, 60)]
     x = [LEAST_CELLS * math.pi / math.acos(1 - gap / (1 - gap)) for gap in y]
     return Curve(name="guard: nodes in the narrow gap", x=tuple(x), y=tuple(y))
@@ -138,19 +138,19 @@ def _film_cell(found: FilmSolution, reference: FilmSolution, accuracy: float) ->
 
 
 def relaxation_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
-    """Over-relaxation over its factor and the mesh.
+    """Over-relaxation over relaxation factor and mesh.
 
     Parameters
     ----------
     scene : Scene
-        A journal bearing, or a shaft line, of which the aftmost bearing is taken.
+        A journal bearing, or a shaft line, whose aftmost bearing is used.
     size : int, optional
         Cells along either axis.
 
     Returns
     -------
-    Plan or str
-        Or why there is none.
+    MapPlan or str
+        The plan, or why there is none.
     """
     geometry = plain_film(scene)
     n = size or 16
@@ -190,9 +190,9 @@ def relaxation_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
             method=f"eccentricity {nearest:g}",
             x=None,
             y=float(geometry.n_theta),
-            note="No scene relaxes its film: this is the source paper's method.",
+            note="No scene uses relaxation: this is the method of the source paper.",
         ),
-        aside=True,
+        secondary=True,
     )
 
 
@@ -202,14 +202,14 @@ def length_load(scene: Scene, size: int | None = None) -> MapPlan | str:
     Parameters
     ----------
     scene : Scene
-        A journal bearing, or a shaft line, of which the aftmost bearing is taken.
+        A journal bearing, or a shaft line, whose aftmost bearing is used.
     size : int, optional
         Cells along either axis.
 
     Returns
     -------
-    Plan or str
-        Or why there is none.
+    MapPlan or str
+        The plan, or why there is none.
     """
     geometry, own = plain_film(scene), own_film(scene)
     n = size or 10
@@ -246,19 +246,19 @@ def length_load(scene: Scene, size: int | None = None) -> MapPlan | str:
             values=even_ratios(0.003, 10.0, n),
         ).through(own.sommerfeld),
         judges={rung: judge_of(rung) for rung in ("short", "finite", "long", "direct")},
-        note=f"least film within {scene.accuracy:.2g} of a direct solve on 216 x 33 nodes",
+        note=f"minimum film within {scene.accuracy:.2g} of a direct solve on 216 x 33 nodes",
         own=Own(
             method=_film_method(scene),
             x=geometry.length_to_diameter,
             y=own.sommerfeld,
             note=own.note,
         ),
-        aside=isinstance(scene, ShaftScene),
+        secondary=isinstance(scene, ShaftScene),
     )
 
 
 def _per_sommerfeld(number: float) -> tuple[float, float]:
-    """Load over ``eta omega R^3 L / C^2``."""
+    """Load over ``eta omega R^3 L / C^2`` at a Sommerfeld number."""
     return sommerfeld_number(number), 0.0
 
 
@@ -274,7 +274,7 @@ def _rest_cell(found: Any, reference: Any, accuracy: float) -> Cell:
     off = abs((1 - found.eccentricity_ratio) / (1 - reference.eccentricity_ratio) - 1)
     return (
         Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE
-    ), f"least film off by {off:.2g}"
+    ), f"minimum film off by {off:.2g}"
 
 
 # --- shaft line
@@ -300,8 +300,8 @@ def speed_viscosity(scene: Scene, size: int | None = None) -> MapPlan | str:
 
     Returns
     -------
-    Plan or str
-        Or why there is none.
+    MapPlan or str
+        The plan, or why there is none.
     """
     shaft = cast(ShaftScene, scene)
     n, viscosity = size or 11, shaft.oil.dynamic_viscosity
@@ -318,8 +318,8 @@ def speed_viscosity(scene: Scene, size: int | None = None) -> MapPlan | str:
             name="viscosity", unit="Pa s", values=even_ratios(viscosity / 30, viscosity * 10, n)
         ).through(viscosity),
         judges={_mesh_name(*mesh): _line_judge(shaft, *mesh) for mesh in meshes},
-        note="status, and least film against a mesh of twice the nodes in both directions; a "
-        "failure is physical where twice the nodes round the bore fail too",
+        note="status, and minimum film against a mesh of twice the nodes in both directions; a "
+        "failure is physical if it persists with twice the nodes around the bore",
         own=Own(
             method=_mesh_name(shaft.film.n_theta, shaft.film.n_z), x=shaft.drive.speed, y=viscosity
         ),
@@ -336,7 +336,7 @@ def _line_at(
     oil = scene.oil.thickened(viscosity / scene.oil.dynamic_viscosity)
     values = {"drive.speed": speed, "duration": 2 / speed, "oil": oil}
     values |= {"film.n_theta": mesh[0], "film.n_z": mesh[1]}
-    # enough for the orders of the forces; more would ask for a finer beam
+    # enough for the orders of the forces; more would require a finer beam
     values |= {"sample_rate": max(scene.sample_rate, 40 * speed), "tacho": None}
     return cast(ShaftScene, changed(scene, values))
 
@@ -350,7 +350,7 @@ def _line_judge(scene: ShaftScene, n_theta: int, n_z: int) -> Judge:
         word = f"{found.status.name.lower()}: {found.status.text}"
         if found.status in _LINE_METHOD:
             return _LINE_METHOD[found.status], word
-        # a failed search has refined its meshes along the length by itself: round the bore is left
+        # a failed search has already refined its meshes along the length: refine around the bore
         along = 2 * n_z - 1 if found.status.ok else n_z
         finer = outcome(_line_at(scene, speed, viscosity, (2 * n_theta, along)))
         if not found.status.ok:
@@ -361,6 +361,6 @@ def _line_judge(scene: ShaftScene, n_theta: int, n_z: int) -> Judge:
             return Verdict.INACCURATE, f"a finer mesh ends with {finer.status.name.lower()}"
         off = abs(float(found.numerics["min_film_m"]) / float(finer.numerics["min_film_m"]) - 1)
         fine = off <= scene.accuracy
-        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"least film off by {off:.2g}"
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"minimum film off by {off:.2g}"
 
     return judge

@@ -1,7 +1,7 @@
 """Maps of a pump's joints: step by contact stiffness, clearance by speed.
 
-The first sets classical steppers on the contact as an oscillator beside the mechanism itself, the
-second runs the machine, and tells its chaos from the faults of its step.
+The first compares classical steppers on the contact, as an oscillator, with the mechanism itself.
+The second runs the machine, and distinguishes its chaos from errors of the step.
 """
 
 import math
@@ -36,16 +36,16 @@ from .steppers import STEPPERS, Stepper, bounce, decays
 Array = NDArray[np.float64]
 
 _JOINTS = ("crankpin", "wristpin", "guide")
-_PHASES = np.arange(8) / 8  # of a step, at which a contact may be met
-_WATCHED = 600  # steps, of a free oscillator
-_STARTS = (0.0, 1.7, 3.3, 5.0)  # rad, over the first turn
-_FINER = 4  # steps or nodes for one, to tell the machine from its method
+_PHASES = np.arange(8) / 8  # of a step, at which contact may begin
+_WATCHED = 600  # steps of a free oscillator
+_STARTS = (0.0, 1.7, 3.3, 5.0)  # rad, start angles
+_FINER = 4  # refinement factor that distinguishes the machine from its method
 
 # --- contact oscillator of a joint
 
 
 class _Contact(NamedTuple):
-    """A joint as an oscillator: the mass that its contact feels, stiffness, damping."""
+    """A joint as an oscillator: effective mass at the contact, stiffness, damping."""
 
     joint: str
     mass: float
@@ -54,7 +54,7 @@ class _Contact(NamedTuple):
 
 
 def contact_oscillator(scene: PumpScene) -> _Contact | None:
-    """Stiffest compliant joint of the first throw as a mass on a spring and a dashpot.
+    """Stiffest compliant joint of the first throw as mass, spring and dashpot.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def contact_oscillator(scene: PumpScene) -> _Contact | None:
     Returns
     -------
     _Contact or None
-        The least mass that the contact feels over a revolution [kg], stiffness [N/m] and damping
-        [N s/m], tangents at the ideal joint's largest load; None where no joint is compliant.
+        Smallest effective mass at the contact over a revolution [kg], stiffness [N/m] and damping
+        [N s/m] as tangents at the largest load of the ideal joint; None if no joint is compliant.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def contact_oscillator(scene: PumpScene) -> _Contact | None:
 
 
 def contact_restitution(damping_ratio: float) -> float:
-    """Restitution of a Kelvin-Voigt contact that never pulls, at any damping.
+    """Restitution of a Kelvin-Voigt contact without tension, at any damping.
 
     Notes
     -----
@@ -148,18 +148,18 @@ def step_stiffness(scene: Scene, size: int | None = None) -> MapPlan | str:
     curves[_MECHANISM] = [*curves["runge-kutta 4"], _guard_curve(pump, contact, y)]
     return MapPlan(
         name="step-stiffness",
-        title=f"contact of the {contact.joint}, step by stiffness, damping as it is",
+        title=f"contact of the {contact.joint}, step by stiffness, damping as in the scene",
         x=x,
         y=y,
         judges=judges,
         curves=curves,
-        note="growth of the pressed contact; speed after an impact, over that before, within "
+        note="growth in the closed contact; speed after an impact over that before, within "
         f"{scene.accuracy:.2g}; the mechanism: rms of the joint's force",
         own=Own(
             method=_MECHANISM,
             x=step,
             y=contact.stiffness,
-            note=f"A check lets a scene take at most {guard:.2g} times this step.",
+            note=f"A check limits the step of a scene to {guard:.2g} times this step.",
         ),
     )
 
@@ -183,14 +183,14 @@ def _guard_curve(scene: PumpScene, contact: _Contact, y: MapAxis) -> Curve:
     longest = [
         LARGEST_STEP_PER_CONTACT_TIME / contact_rate(_stiff(scene, contact, k)) for k in y.values
     ]
-    return Curve(name="guard: longest step let pass", x=tuple(longest), y=y.values)
+    return Curve(name="guard: longest allowed step", x=tuple(longest), y=y.values)
 
 
 def _stiff(scene: PumpScene, contact: _Contact, stiffness: float) -> PumpScene:
-    """A scene whose joint has another tangent stiffness under its largest load.
+    """Scene whose joint has another tangent stiffness under its largest load.
 
-    That of Hertz's law goes with the power 2/3 of its constant, that of the conformal one nearly
-    with its modulus.
+    The stiffness of Hertz's law is proportional to the power 2/3 of its constant, that of the
+    conformal law nearly to its modulus.
     """
     path = f"joint.{contact.joint}"
     part = getattr(scene.joint, contact.joint)
@@ -209,7 +209,7 @@ _STIFFENED = {
 def _stepper_judge(
     stepper: Stepper, contact: _Contact, x: MapAxis, y: MapAxis, accuracy: float
 ) -> Judge:
-    """A whole plane at once, on first use."""
+    """Judge of a stepper; the whole plane is computed at once on first use."""
 
     @cache
     def plane() -> dict[tuple[float, float], Cell]:
@@ -239,7 +239,7 @@ def _stepper_cell(stable: bool, off: float, accuracy: float) -> Cell:
 
 
 def _mechanism_judge(scene: PumpScene, contact: _Contact) -> Judge:
-    """The whole mechanism without its guard, against a quarter of the longest step let pass."""
+    """Judge of the mechanism without guard, against a quarter of the longest allowed step."""
 
     @cache
     def reference(stiffness: float) -> Array:
@@ -253,9 +253,9 @@ def _mechanism_judge(scene: PumpScene, contact: _Contact) -> Judge:
             return Verdict.FAILS, "no finer step runs either"
         found = _joint_rms(_stiff(scene, contact, stiffness), contact.joint, step)
         if not np.all(found < _BOUNDLESS * right.max()):  # also where it is not finite
-            return Verdict.UNSTABLE, "force without bound"
+            return Verdict.UNSTABLE, "force grows without bound"
         off, mean = abs(found.mean() / right.mean() - 1), right.mean()
-        # impacts are chaotic: what the starts scatter by is no error
+        # impacts are chaotic: the scatter between starts is no error
         scatter = 3 * math.hypot(found.std(ddof=1), right.std(ddof=1)) / math.sqrt(len(_STARTS))
         fine = off <= max(scene.accuracy, scatter / mean)
         return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"rms force off by {off:.2g}"
@@ -267,7 +267,7 @@ _BOUNDLESS = 4.0  # times the largest rms of a good run
 
 
 def _joint_rms(scene: PumpScene, joint: str, step: float) -> Array:
-    """Rms of a joint's force over the second revolution, by start [N]; NaN of a failed run."""
+    """Rms force of a joint over the second revolution, for each start [N]; NaN if a run fails."""
     columns = {"crankpin": ("pin_x", "pin_y"), "wristpin": ("wrist_x", "wrist_y")}.get(
         joint, ("guide_y",)
     )
@@ -285,7 +285,7 @@ def _joint_rms(scene: PumpScene, joint: str, step: float) -> Array:
 
 
 def clearance_speed(scene: Scene, size: int | None = None) -> MapPlan | str:
-    """The machine itself: contact lost, chaos, statuses, over speed and crank-pin clearance.
+    """The machine itself: loss of contact, chaos and statuses over speed and crank-pin clearance.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def clearance_speed(scene: Scene, size: int | None = None) -> MapPlan | str:
     method = f"step of the scene, and a {_FINER}th"
     return MapPlan(
         name="clearance-speed",
-        title="crank-pin clearance by speed, the scene otherwise as it is",
+        title="crank-pin clearance by speed, the scene otherwise as written",
         x=MapAxis(
             name="speed",
             unit="Hz",
@@ -318,8 +318,8 @@ def clearance_speed(scene: Scene, size: int | None = None) -> MapPlan | str:
             name="diametral clearance", unit="m", values=even_ratios(gap / 30, gap * 10, n)
         ).through(gap),
         judges={method: lambda x, y: _pump_cell(pump, x, y)},
-        note=f"status and contact, repeated at a {_FINER}th of the step; chaos: a clearance larger "
-        "by 1e-9 parts the orbits by a thousandth of it",
+        note=f"status and contact, repeated at a {_FINER}th of the step; chaos: increasing the "
+        "clearance by 1e-9 separates the orbits by a thousandth of it",
         own=Own(method=method, x=pump.drive.speed, y=gap),
     )
 
@@ -332,20 +332,20 @@ def _pump_at(scene: PumpScene, speed: float, clearance: float) -> PumpScene:
 
 
 def _pump_cell(scene: PumpScene, speed: float, clearance: float) -> Cell:
-    here = _pump_at(scene, speed, clearance)
+    pump = _pump_at(scene, speed, clearance)
     try:
-        first = outcome(here)
+        first = outcome(pump)
     except SceneError as error:
         return Verdict.REFUSED, error.faults[0]
     if not first.numerics:  # refused before the run
         return Verdict.REFUSED, f"{first.status.name.lower()}: {first.status.text}"
-    finer = changed(here, {"numerics.step": float(first.numerics["step_s"]) / _FINER})
+    finer = changed(pump, {"numerics.step": float(first.numerics["step_s"]) / _FINER})
     again = outcome(finer)
     if not first.status.ok:
-        return _told_apart(first.status, again.status)
+        return _failed_cell(first.status, again.status)
     if not again.status.ok:
         return Verdict.INACCURATE, f"a finer step ends with {again.status.name.lower()}"
-    if _parts(here, first, clearance) and _parts(finer, again, clearance):
+    if _is_chaotic(pump, first, clearance) and _is_chaotic(finer, again, clearance):
         return Verdict.CHAOTIC, f"in flight for {_flight(first, clearance):.1%} of the time"
     lost = _flight(first, clearance)
     if lost > 0 and _flight(again, clearance) > 0:
@@ -356,23 +356,23 @@ def _pump_cell(scene: PumpScene, speed: float, clearance: float) -> Cell:
     ), f"rms force off by {off:.2g}"
 
 
-def _told_apart(status: Status | OrbitStatus, finer: Status | OrbitStatus) -> Cell:
-    """A failure that a finer run shows too is the machine's."""
+def _failed_cell(status: Status | OrbitStatus, finer: Status | OrbitStatus) -> Cell:
+    """Verdict on a failed run; a failure that a finer run shows too has a physical cause."""
     word = status.name.lower()
     return (Verdict.UNSTABLE if finer.ok else Verdict.FAILS), f"{word}: {status.text}"
 
 
-def _parts(scene: PumpScene, run: Recording, clearance: float) -> bool:
-    """Whether an unmeasurable change of the clearance parts the orbits."""
+def _is_chaotic(scene: PumpScene, run: Recording, clearance: float) -> bool:
+    """Whether an immeasurably small change of the clearance makes the orbits diverge."""
     near = outcome(changed(scene, {"joint.crankpin.diametral_clearance": clearance * (1 + 1e-9)}))
     if not near.status.ok:
         return True
-    apart = np.abs(near.truth["pin_offset_m"] - run.truth["pin_offset_m"]).max()
-    return bool(apart > 1e-3 * clearance / 2)
+    distance = np.abs(near.truth["pin_offset_m"] - run.truth["pin_offset_m"]).max()
+    return bool(distance > 1e-3 * clearance / 2)
 
 
 def _flight(run: Recording, clearance: float) -> float:
-    """Share of the samples at which the pin touches its eye nowhere."""
+    """Share of the samples at which the pin does not touch its eye."""
     return float(np.mean(np.hypot(*run.truth["pin_offset_m"].T) < clearance / 2))
 
 

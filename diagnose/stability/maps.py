@@ -1,7 +1,7 @@
 """The stability maps of every machine, by name.
 
-A maker takes a scene and gives a plan, or the reason why this scene has no such map. A new map is
-one row of :data:`MAPS`.
+A maker returns the plan of a map for a scene, or the reason why the map does not apply to it. A new
+map is one row of :data:`MAPS`.
 """
 
 from collections.abc import Callable
@@ -31,4 +31,4 @@ MAPS: dict[str, dict[str, Maker]] = {
     "journal-bearing": {"step-squeeze": step_squeeze, "speed-load": speed_load, **_FILMS},
     "propulsion-shaft": {"speed-viscosity": speed_viscosity, **_FILMS},
 }
-"""Machine -> its maps. A new one is one row."""
+"""Machine -> its maps."""

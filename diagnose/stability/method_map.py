@@ -1,9 +1,9 @@
-"""Where each method fails on a scene: accurate, inaccurate or unstable, theory over it.
+"""Accuracy and stability of each method around a scene, with limits from theory.
 
-A map is a plane of two quantities and a panel for every method. A cell says how one run of one
-method ended there; failed runs are kept, with their word. What another step or mesh removes has a
-numerical cause, what it does not remove a physical one: the two never share a colour. The scene
-itself is a cell of every map: its row and column are run first. The maps themselves are in
+A map is a plane of two quantities, with a panel for every method. A cell holds the result of a run
+of one method; failed runs are kept, with their reason. A failure that another step or mesh removes
+has a numerical cause, otherwise a physical one; the two never share a colour. The scene itself is a
+cell of every map, and its row and column are run first. The maps themselves are in
 :mod:`.stability.maps`, the distance from the scene to the next failure in :mod:`.stability.edges`.
 """
 
@@ -17,11 +17,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-_COARSEST = 4  # every fourth cell first: a run that is cut short has seen all of the plane
+_COARSEST = 4  # every fourth cell first: an interrupted run has covered the whole plane
 
 
 class Verdict(IntEnum):
-    """How a method did in one cell."""
+    """Result of a method in one cell."""
 
     NOT_RUN = 0
     ACCURATE = 1
@@ -36,12 +36,12 @@ class Verdict(IntEnum):
 
     @property
     def text(self) -> str:
-        """As in a legend."""
+        """Text for a legend."""
         return _TEXT[self]
 
     @property
     def cause(self) -> str:
-        """``numerical``: a finer step or mesh removes it; ``physical``: the machine does it."""
+        """``numerical``: removed by a finer step or mesh; ``physical``: caused by the machine."""
         if self >= Verdict.LOST:
             return "physical"
         return "numerical" if self >= Verdict.INACCURATE else ""
@@ -68,13 +68,13 @@ class MapAxis:
     Attributes
     ----------
     name, unit : str
-        Unit empty where there is none.
+        The unit is empty if there is none.
     values : tuple of float
         Rising.
     log : bool
-        Even ratios rather than even steps.
+        Equal ratios rather than equal steps.
     even : bool
-        Even whole numbers only, as nodes round a bore are.
+        Only even integers, such as nodes around a bore.
     """
 
     name: str
@@ -85,12 +85,12 @@ class MapAxis:
 
     @property
     def label(self) -> str:
-        """With its unit."""
+        """Name with its unit."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
     def quantity(self) -> str:
-        """Its name without what explains it.
+        """Name without its explanation.
 
         Examples
         --------
@@ -100,7 +100,7 @@ class MapAxis:
         return self.name.partition(",")[0].partition(" (")[0]
 
     def written(self, value: float) -> str:
-        """A value with its unit, and a prefix where the number would be unwieldy.
+        """A value with its unit, and a prefix if the number would be unwieldy.
 
         Examples
         --------
@@ -113,7 +113,7 @@ class MapAxis:
         return f"{value:.3g} {self.unit}".rstrip()
 
     def through(self, value: float | None) -> "MapAxis":
-        """The same axis with a value > 0 on it: the nearest inside gives way, the ends stay.
+        """The axis with a value > 0 on it, which replaces the nearest value inside, not an end.
 
         Examples
         --------
@@ -145,9 +145,9 @@ class Curve:
     Attributes
     ----------
     name : str
-        What the theory is.
+        Name of the theory.
     x, y : tuple of float
-        In the units of the axes; a point outside is not drawn.
+        Coordinates in the units of the axes; points outside are not drawn.
     """
 
     name: str
@@ -160,12 +160,12 @@ def coordinates(points: list[tuple[float, float]], column: int) -> tuple[float, 
     return tuple(point[column] for point in points)
 
 
-_SAME = 1e-9  # of a value: two that differ by less are one
+_SAME = 1e-9  # relative difference below which two values are the same
 _PREFIXES = ((1e-9, "n"), (1e-6, "u"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
 _PREFIXED = {"s", "m", "N", "N/m", "Pa s"}
 
 Cell = tuple[Verdict, str]
-"""Verdict and a word on it: a status, an error."""
+"""Verdict and its explanation: a status, an error."""
 
 Judge = Callable[[float, float], Cell]
 """``(x, y) -> cell``: one run of one method."""
@@ -178,11 +178,11 @@ class Own:
     Attributes
     ----------
     method : str
-        Panel of what it is computed with, as written.
+        Panel of its method as written.
     x, y : float or None
-        Of the axes; None where the scene has no such quantity.
+        Values on the axes; None if the scene has no such quantity.
     note : str
-        Where the panel is not quite its method: what is different.
+        How the panel differs from its method, if it does.
     """
 
     method: str
@@ -204,11 +204,11 @@ class MapPlan:
     curves : mapping of str to sequence of Curve
         Theory for a method; under "" for all.
     note : str
-        What the colours are judged by.
+        Criterion of the verdicts.
     own : Own, optional
-        Where the scene lies; its values are on the axes.
-    aside : bool
-        Of methods that the scene is not computed with: it waits for the other maps.
+        Position of the scene; its values are on the axes.
+    secondary : bool
+        It shows methods that the scene does not use, and is run after the other maps.
     """
 
     name: str
@@ -219,15 +219,15 @@ class MapPlan:
     curves: Mapping[str, Sequence[Curve]] = field(default_factory=dict)
     note: str = ""
     own: Own | None = None
-    aside: bool = False
+    secondary: bool = False
 
     def theory(self, method: str) -> list[Curve]:
-        """Curves over the panel of a method."""
+        """Curves in the panel of a method."""
         return [*self.curves.get("", ()), *self.curves.get(method, ())]
 
     @property
     def cell(self) -> tuple[int, int] | None:
-        """Row and column of the scene; None where it is not on both axes."""
+        """Row and column of the scene; None if it is not on both axes."""
         if self.own is None or self.own.x is None or self.own.y is None:
             return None
         return self.y.values.index(self.own.y), self.x.values.index(self.own.x)
@@ -252,23 +252,23 @@ class MapPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class Edge:
-    """Where the scene's own method changes its verdict, going one way along one axis.
+    """Change of the verdict on the scene's own method, in one direction along one axis.
 
     Attributes
     ----------
     axis : str
         "x" or "y".
     rising : bool
-        Which way.
+        Direction.
     inside, outside : float
-        Last value with a verdict as good as the scene's (where the scene itself is bad: as bad),
-        first one with another; `outside` is NaN where none was seen.
+        Last value with a verdict as good (or as bad) as that of the scene, and first value with
+        another; `outside` is NaN if there is none.
     verdict : Verdict
-        At `outside`; NOT_RUN where none was seen.
+        Verdict at `outside`; NOT_RUN if there is none.
     word : str
-        At `outside`.
+        Explanation at `outside`.
     whole : bool
-        Whether all was run on the way, to the end of the axis where no change was seen.
+        Whether all cells up to the edge, or to the end of the axis, were run.
     """
 
     axis: str
@@ -290,9 +290,9 @@ class StabilityMap:
     verdicts : dict of str to numpy.ndarray [shape=(n_y, n_x)]
         Codes of :class:`Verdict` for every method.
     words : dict of str to list of list of str
-        Of the same cells.
+        Explanations of the same cells.
     edges : tuple of Edge
-        Of the scene's own method, from the scene.
+        Edges of the scene's own method around the scene.
     """
 
     plan: MapPlan
@@ -302,7 +302,7 @@ class StabilityMap:
 
     @property
     def methods(self) -> list[str]:
-        """Panels, that of the scene's own method first."""
+        """Methods, the scene's own first."""
         own = self.plan.own.method if self.plan.own else None
         return sorted(self.verdicts, key=lambda name: name != own)
 
@@ -327,14 +327,14 @@ class StabilityMap:
 
 
 class Budget:
-    """Seconds that may be spent; without a limit a map is the same on every machine."""
+    """Available time; without a limit a map is reproducible."""
 
     def __init__(self, seconds: float | None = None) -> None:
         self.end = None if seconds is None else time.monotonic() + seconds
 
     @property
     def spent(self) -> bool:
-        """Whether nothing is left."""
+        """Whether the time is used up."""
         return self.end is not None and time.monotonic() > self.end
 
 
@@ -353,15 +353,15 @@ def measure(
     ----------
     plan : Plan
     budget : Budget, optional
-        Cells that it leaves no time for stay "not run".
+        Cells beyond the budget stay "not run".
     progress : callable, optional
-        ``(done, all)``.
+        Called with (done, all).
     begun : StabilityMap, optional
-        Of the same plan, cut short by a budget: only what it left is run.
+        Incomplete map of the same plan, of which only the missing cells are run.
     methods : sequence of str, optional
-        Panels that are run; all by default.
+        Methods to be run; by default all.
     cells : sequence of tuple of int, optional
-        Row and column of those that are run; all by default.
+        Row and column of the cells to be run; by default all.
 
     Returns
     -------
@@ -386,7 +386,7 @@ def measure(
 
 
 def unmeasured(plan: MapPlan) -> StabilityMap:
-    """A map of which no cell is run."""
+    """A map without any cell run."""
     n_y, n_x = len(plan.y.values), len(plan.x.values)
     return StabilityMap(
         plan=plan,
@@ -396,7 +396,7 @@ def unmeasured(plan: MapPlan) -> StabilityMap:
 
 
 def coarse_first(shape: tuple[int, int]) -> Iterator[tuple[int, int]]:
-    """Cells of a plane: every fourth of both directions, then every second, then the rest.
+    """Cells of a plane: every fourth in both directions, then every second, then the rest.
 
     Examples
     --------
@@ -414,18 +414,18 @@ def coarse_first(shape: tuple[int, int]) -> Iterator[tuple[int, int]]:
 
 
 def edge(codes: NDArray[np.int64], x: Sequence[float]) -> NDArray[np.float64]:
-    """Where each row turns unstable, between the last stable cell and the first unstable one.
+    """Stability limit of each row, between the last stable and the first unstable cell.
 
     Parameters
     ----------
     codes : numpy.ndarray [shape=(n_y, n_x)]
     x : sequence of float
-        Of the columns, > 0.
+        Values of the columns, > 0.
 
     Returns
     -------
     numpy.ndarray [shape=(n_y,)]
-        Geometric mean of the two; NaN where a row is all stable or all unstable.
+        Geometric mean of the two; NaN if a row is all stable or all unstable.
 
     Examples
     --------

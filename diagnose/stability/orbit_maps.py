@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 def step_squeeze(scene: Scene, size: int | None = None) -> MapPlan | str:
-    """Integrators of the orbit about an equilibrium: step by how far out it lies.
+    """Integrators of the orbit about an equilibrium: step by remaining gap.
 
     Parameters
     ----------
@@ -70,13 +70,13 @@ def step_squeeze(scene: Scene, size: int | None = None) -> MapPlan | str:
             **{f"{name}, no guard": [curve] for name, curve in limits.items()},
             **{name: [curve] for name, curve in limits.items()},
         },
-        note="a displacement of a thousandth of the gap, followed within "
+        note="motion after a displacement of a thousandth of the gap, followed within "
         f"{scene.accuracy:.2g} of it",
         own=Own(
             method=journal.numerics.integrator,
             x=step,
             y=gap,
-            note="The step is the longest that it may take."
+            note="The step is the longest allowed step."
             if journal.numerics.integrator == "adaptive"
             else "",
         ),
@@ -113,14 +113,14 @@ def linear_film(case: _OrbitCase, x: float) -> tuple[Array, Array]:
 
 
 def growth(stepper: Stepper, stiffness: Array, damping: Array, step: float) -> float:
-    """Factor by which a step of a stepper multiplies the largest motion of a linear film.
+    """Largest growth factor of one step of a stepper on a linear film.
 
     Parameters
     ----------
     stepper : Stepper
-        An explicit one.
+        An explicit stepper.
     stiffness, damping : numpy.ndarray [shape=(2, 2)]
-        Over the inertia.
+        Stiffness and damping over the inertia.
     step : float
 
     Returns
@@ -151,15 +151,15 @@ def _growths(stepper: Stepper, stiffness: Array, damping: Array, steps: Array) -
 
 
 def squeeze_limit(case: _OrbitCase, x: float, stepper: Stepper) -> float:
-    """Step from which on a stepper is unstable by itself on the film about (x, 0) [rad].
+    """Step from which a stepper itself is unstable on the film about (x, 0) [rad].
 
-    Where the film whirls by itself a step of any length grows; the limit is where the growth of a
-    step passes that of the motion itself by a hundredth, half a per cent beyond 2 over the damping.
+    If the film whirls, motion grows at any step. The limit is therefore where the growth per step
+    exceeds that of the motion itself by 1 %, half a per cent beyond 2 over the damping.
     """
     stiffness, damping = linear_film(case, x)
     own = np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), -np.hstack([stiffness, damping])])
     rate = max(0.0, float(np.linalg.eigvals(own).real.max()))
-    for steps in np.split(np.geomspace(1e-5, 10.0, 2000), 20):  # mostly found in an early one
+    for steps in np.split(np.geomspace(1e-5, 10.0, 2000), 20):  # usually found in an early part
         allowed = 1.01 * np.exp(rate * steps)
         over = steps[_growths(stepper, stiffness, damping, steps) > allowed]
         if len(over):
@@ -175,8 +175,8 @@ def _squeeze_curve(case: _OrbitCase, y: MapAxis, stepper: Stepper) -> Curve:
     )
 
 
-_FEWEST, _MOST = 60, 400  # steps of a run beside an equilibrium
-_AWAY = 1e-3  # of the gap
+_FEWEST, _MOST = 60, 400  # steps of a run near an equilibrium
+_AWAY = 1e-3  # initial displacement, over the gap
 
 
 def _reference(case: _OrbitCase, step: float, gap: float) -> OrbitRun:
@@ -197,7 +197,7 @@ def _steps_for(step: float) -> int:
 
 
 def _bare_judge(case: _OrbitCase, stepper: Stepper, accuracy: float) -> Judge:
-    """A classical stepper on the film itself, with nothing to stop it."""
+    """Judge of a classical stepper on the film itself, without guards."""
 
     def judge(step: float, gap: float) -> Cell:
         q_x, q_y = _rest_load(case, 1 - gap)
@@ -221,7 +221,7 @@ def _bare_judge(case: _OrbitCase, stepper: Stepper, accuracy: float) -> Judge:
 def _guarded_judge(
     case: _OrbitCase, integrator: str, accuracy: float, tolerance: float = 1e-5
 ) -> Judge:
-    """An integrator as a recording uses it."""
+    """Judge of an integrator as used for recordings."""
 
     def judge(step: float, gap: float) -> Cell:
         n = _steps_for(step)
@@ -254,7 +254,7 @@ def _orbit_cell(
         return Verdict.UNSTABLE, status.name.lower() if not status.ok else "leaves the bore"
     away = np.hypot(*(path[: len(reference.position)] - reference.position).T).max()
     size = np.hypot(*(reference.position - [1 - gap, 0.0]).T).max()
-    if not away < 2 * size:  # two motions that both stay within the displacement part by no more
+    if not away < 2 * size:  # largest distance of two motions within the displacement
         return Verdict.UNSTABLE, "grows"
     verdict = Verdict.ACCURATE if away <= accuracy * size else Verdict.INACCURATE
     return verdict, f"off by {away / size:.2g} of the displacement"
@@ -264,7 +264,7 @@ def _orbit_cell(
 
 
 def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
-    """Whirl: what a displaced journal does at each speed and load, with the linear threshold.
+    """Whirl of a displaced journal over speed and load, with the linear threshold.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
     journal = cast(JournalScene, scene)
     n, weight = size or 11, journal_weight(journal)
     if not weight > 0:
-        return "nothing rests on the journal; set load.static, in newtons"
+        return "the journal carries no load; set load.static, in newtons"
     x = MapAxis(
         name="speed",
         unit="Hz",
@@ -303,8 +303,8 @@ def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
         y=y,
         judges={name: _whirl_judge(journal, *setting) for name, setting in settings.items()},
         curves={"": [threshold_curve(journal, x, y)]},
-        note="a displacement of a hundredth of the gap dies out or grows; the adaptive integrator "
-        "at a hundredth of its tolerance decides what is right",
+        note="a displacement of a hundredth of the gap decays or grows; the reference is the "
+        "adaptive integrator at a hundredth of its tolerance",
         own=Own(method=own, x=journal.drive.speed, y=weight),
     )
 
@@ -315,7 +315,7 @@ _SETTINGS = {
     "euler, step 0.02": ("euler", 0.02, 1e-5),
     "euler, step 0.2": ("euler", 0.2, 1e-5),
 }
-"""Integrator, longest step [rad] and tolerance of the panels beside that of the scene."""
+"""Integrator, longest step [rad] and tolerance of the panels in addition to that of the scene."""
 
 
 def at_load(scene: JournalScene, speed: float, weight: float) -> JournalScene:
@@ -325,7 +325,7 @@ def at_load(scene: JournalScene, speed: float, weight: float) -> JournalScene:
 
 
 def threshold_curve(scene: JournalScene, x: MapAxis, y: MapAxis) -> Curve:
-    """Speeds at which the equilibrium of each load loses its stability, by its coefficients."""
+    """Speeds at which the equilibrium of each load loses stability, from linear coefficients."""
     points = []
     for weight in np.geomspace(y.values[0] / 1.2, y.values[-1] * 1.2, 40):
         speed = threshold_speed(scene, float(weight), x.values[0] / 2, 2 * x.values[-1])
@@ -337,7 +337,7 @@ def threshold_curve(scene: JournalScene, x: MapAxis, y: MapAxis) -> Curve:
 
 
 def threshold_speed(scene: JournalScene, weight: float, low: float, high: float) -> float:
-    """Speed at which the equilibrium under a load loses its stability [Hz]; NaN where none does.
+    """Speed at which the equilibrium under a load loses its stability [Hz]; NaN if none.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def threshold_speed(scene: JournalScene, weight: float, low: float, high: float)
     weight : float
         Steady load along X [N].
     low, high : float
-        Between which it is looked for [Hz].
+        Bounds of the search [Hz].
 
     Examples
     --------
@@ -359,18 +359,18 @@ def threshold_speed(scene: JournalScene, weight: float, low: float, high: float)
         return math.nan
 
     def beyond(speed: float) -> float:
-        """Margin, where endless cut to a number: an end of a bracket all the same."""
+        """Margin, with infinity replaced by a number, so that it can bound a bracket."""
         margin = margins[speed] if speed in margins else _margin(scene, weight, speed)
         return float(np.clip(margin, -_FAR, _FAR))
 
     return float(brentq(beyond, low, high, xtol=1e-6 * low))
 
 
-_FAR = 5.0  # e^5 of the threshold's mass: no root is near
+_FAR = 5.0  # e^5 times the mass at the threshold: no root is near
 
 
 def _margin(scene: JournalScene, weight: float, speed: float) -> float:
-    """Logarithm of the rotor's mass over that at the threshold: above zero it whirls."""
+    """Logarithm of the rotor's mass over that at the threshold; whirl above zero."""
     here = at_load(scene, speed, weight)
     scale = journal_scale(here)
     unit = scale.alpha * scale.force
@@ -378,7 +378,7 @@ def _margin(scene: JournalScene, weight: float, speed: float) -> float:
     try:
         found = equilibrium(film_geometry(here), (weight / unit, 0.0), rung=rung)
     except BearingError:
-        return -math.inf  # too slow to carry the load: the journal lies on its shell
+        return -math.inf  # too slow to carry the load: the journal touches its shell
     limit = whirl(found).threshold.mass
     if limit == 0:
         return math.inf
@@ -392,20 +392,20 @@ def _whirl_judge(
         true, word = whirls(scene, speed, weight)
         if true is None:
             return Verdict.FAILS, word
-        told, word = whirls(
+        judged, word = whirls(
             scene, speed, weight, integrator=integrator, step=step, tolerance=tolerance
         )
-        if told is None:
+        if judged is None:
             status = word.partition(":")[0]
             return (Verdict.REFUSED if status == "step" else Verdict.UNSTABLE), word
-        if told != true:
-            return Verdict.INACCURATE, f"says that it {'grows' if told else 'dies out'}"
+        if judged != true:
+            return Verdict.INACCURATE, f"wrongly {'grows' if judged else 'decays'}"
         return (Verdict.WHIRL if true else Verdict.ACCURATE), word
 
     return judge
 
 
-_WATCH = 160.0  # rad; a motion at half the speed turns a dozen times
+_WATCH = 160.0  # rad; a dozen revolutions at half the speed
 
 
 def whirls(
@@ -423,18 +423,18 @@ def whirls(
     ----------
     scene : JournalScene
     speed, weight : float
-        [Hz], steady load along X [N].
+        Speed [Hz] and steady load along X [N].
     integrator : str
-        Of the orbit.
+        Integrator of the orbit.
     step, tolerance : float
-        Of the integrator.
+        Step [rad] and tolerance of the integrator.
 
     Returns
     -------
     bool or None
-        None where no equilibrium was found or the run failed.
+        None if no equilibrium was found or the run failed.
     str
-        Status, or the ratio of the motion late in the run to that at its begin.
+        Status, or the ratio of late to early motion.
     """
     here = at_load(scene, speed, weight)
     scale, film = journal_scale(here), journal_film(here)
@@ -455,13 +455,13 @@ def whirls(
         sample_step=0.2,
         tolerance=tolerance,
     )
-    if run.status in (OrbitStatus.THIN, OrbitStatus.CONTACT):  # from beside its equilibrium
+    if run.status in (OrbitStatus.THIN, OrbitStatus.CONTACT):  # from near its equilibrium
         return True, f"grows to the wall: {run.status.text}"
     if not run.status.ok:
         return None, f"{run.status.name.lower()}: {run.status.text}"
-    turn = round(4 * math.pi / 0.2)  # of a motion at half the speed
+    turn = round(4 * math.pi / 0.2)  # samples per revolution at half the speed
     early = float(np.ptp(run.position[turn : 3 * turn], axis=0).max())
     late = float(np.ptp(run.position[-2 * turn :], axis=0).max())
     ratio = late / early if early > 0 else 0.0
-    # what has died out to the tolerance neither grows nor shrinks
-    return bool(ratio > 1 and late > 1e-6), f"late motion {ratio:.2g} of the early"
+    # a motion below the tolerance neither grows nor decays
+    return bool(ratio > 1 and late > 1e-6), f"late motion {ratio:.2g} times the early motion"

@@ -1,6 +1,6 @@
-"""Where a scene lies in its maps: load, gap left, Sommerfeld number, mesh, step and method.
+"""Position of a scene in its maps: load, remaining gap, Sommerfeld number, mesh, step, method.
 
-And how it is taken to another cell: with values changed, and run there.
+Also the change of its values to those of another cell, and the run there.
 """
 
 import math
@@ -19,22 +19,22 @@ from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.at_rest import film_bearings, shaft_state
 
-GAP_LEFT = "gap left, 1 - eccentricity ratio"
-"""Axis of the films."""
+GAP_LEFT = "remaining gap, 1 - eccentricity ratio"
+"""Name of the eccentricity axis of film maps."""
 
 
 class OwnFilm(NamedTuple):
-    """The film of a scene at rest in its running state.
+    """Film of a scene at its running equilibrium.
 
     Attributes
     ----------
     gap : float or None
-        Thinnest film of the middle over the radial clearance, 1 - eccentricity ratio; None where
-        no rest is found.
+        Minimum film thickness at mid-length over the radial clearance, 1 - eccentricity ratio; None
+        if there is no equilibrium.
     sommerfeld : float or None
-        Sommerfeld number; None where nothing rests on the film.
+        Sommerfeld number; None if the film carries no load.
     note : str
-        How the maps of plain, aligned films differ from that of the scene.
+        How the plain, aligned film of the maps differs from that of the scene.
     """
 
     gap: float | None
@@ -49,12 +49,12 @@ def journal_weight(scene: JournalScene) -> float:
 
 def orbit_step(scene: JournalScene) -> float:
     """Longest step of the orbit's integrator, as written or by default [rad]."""
-    told = scene.numerics.step
-    return JOURNAL_STEP if told is None else math.tau * scene.drive.speed * told
+    step = scene.numerics.step
+    return JOURNAL_STEP if step is None else math.tau * scene.drive.speed * step
 
 
 def plain_film(scene: Scene) -> FilmGeometry:
-    """Film of the bearing, or of the aftmost one of a line: a plain bore on the scene's mesh."""
+    """Plain film, on the scene's mesh, of the bearing or of the aftmost bearing of a line."""
     if isinstance(scene, ShaftScene):
         found = film_bearings(scene)[0].worn.geometry
     else:
@@ -69,12 +69,12 @@ def plain_film(scene: Scene) -> FilmGeometry:
 
 @lru_cache(maxsize=8)
 def own_film(scene: Scene) -> OwnFilm:
-    """Film of a scene at rest.
+    """Film of a scene at its equilibrium.
 
     Parameters
     ----------
     scene : Scene
-        A journal bearing, or a shaft line, of which the aftmost bearing is taken.
+        A journal bearing, or a shaft line, whose aftmost bearing is used.
 
     Returns
     -------
@@ -109,14 +109,14 @@ def _single(scene: JournalScene) -> OwnFilm:
 
 _MAPPED = {
     "short": "",
-    "map": "The scene's film is a map drawn from this one.",
+    "map": "The scene uses a map tabulated from this film.",
     "direct": "",
 }
 
 
 def _aftmost(scene: ShaftScene) -> OwnFilm:
     film = shaft_state(scene, raise_on_failure=False).film
-    note = "This film is plain and aligned, that of the scene is tilted."
+    note = "This film is plain and aligned; that of the scene is tilted."
     if not film.status.ok:
         return OwnFilm(gap=None, sommerfeld=None, note=note)
     bearing = film.bearings[0].worn
@@ -128,7 +128,7 @@ def _aftmost(scene: ShaftScene) -> OwnFilm:
 
 
 def changed(part: Any, values: Mapping[str, Any]) -> Any:
-    """A scene with values replaced by dotted path, not validated again.
+    """Replace values of a scene by dotted path, without validation.
 
     Examples
     --------
@@ -144,5 +144,5 @@ def changed(part: Any, values: Mapping[str, Any]) -> Any:
 
 
 def outcome(scene: Scene) -> Recording:
-    """Run of a scene with its truth, whatever its status."""
+    """Run a scene and return it with its truth, whatever its status."""
     return simulate(scene, seed=0, truth=True, raise_on_failure=False)

@@ -1,4 +1,4 @@
-"""Maps of :mod:`.method_map` as one page: what follows for the scene on top, the maps below."""
+"""Maps of :mod:`.method_map` as one page: conclusions for the scene first, then the maps."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ _PAGES = (".html", ".htm")
 def save_atlas(
     scene: Scene, maps: Sequence[StabilityMap], path: Path, *, force: bool = True
 ) -> None:
-    """Write maps as a page or as a picture, by the suffix.
+    """Write maps as a page or a picture, depending on the suffix.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def save_atlas(
     Raises
     ------
     DataError
-        Another suffix.
+        The suffix is none of these.
     """
     if path.suffix in _PAGES:
         save_page(atlas_html(scene, maps), path, force=force)
@@ -63,7 +63,7 @@ def _shown(found: StabilityMap) -> dict[str, Any]:
         "note": plan.note,
         "axes": f"{plan.x.label} against {plan.y.label}",
         "conclusion": conclusion(found),
-        "aside": plan.aside,
+        "secondary": plan.secondary,
         "whole": found.whole,
         "images": map_images(found),
         "rows": [

@@ -1,6 +1,6 @@
-"""Maps of what rings in a pump: step by length of a pipe, step by masses on a yielding casing.
+"""Maps of free vibration in a pump: step by pipe length, step by masses on a yielding casing.
 
-Either is struck once and left to itself; its frequency is held against the closed form.
+Both are excited once and vibrate freely; the frequency is compared with the closed form.
 """
 
 import math
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 def step_line(scene: Scene, size: int | None = None) -> MapPlan | str:
-    """Pulsation of the discharge pipe at its first frequency: step by length, both rungs of pipes.
+    """First pulsation frequency of the discharge pipe: step by length, both rungs of pipes.
 
     Parameters
     ----------
@@ -74,8 +74,8 @@ def step_line(scene: Scene, size: int | None = None) -> MapPlan | str:
 
 
 _RUNG_PERIODS = 12
-_LEAST_PER_PERIOD = 3.0  # steps, to tell a frequency
-_RINGING_AT = 1e7  # Pa, far from the vapour
+_LEAST_PER_PERIOD = 3.0  # steps, for a frequency
+_RINGING_AT = 1e7  # Pa, far above the vapour pressure
 
 
 def _line_pulsation(line: Line, rung: str, accuracy: float) -> Judge:
@@ -85,17 +85,17 @@ def _line_pulsation(line: Line, rung: str, accuracy: float) -> Judge:
         assert smooth.wave_speed is not None
         exact = smooth.wave_speed / (4 * length)
         if step * exact * _LEAST_PER_PERIOD > 1:
-            return Verdict.INACCURATE, "fewer than three steps a period: a rigid column"
+            return Verdict.INACCURATE, "fewer than three steps per period: a rigid column"
         found = _ringing(smooth, step, math.ceil(_RUNG_PERIODS / (exact * step)), rung)
         off = abs(found / exact - 1)
-        fine = off <= accuracy  # not so where it rings no more
+        fine = off <= accuracy  # False for NaN, if the oscillation has ended
         return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
 
     return judge
 
 
 def _ringing(line: Line, step: float, n_steps: int, rung: str) -> float:
-    """Frequency of a pipe whose flow is stopped, from upward zeros [Hz]; NaN where it is still."""
+    """Frequency of a pipe after its flow is stopped [Hz]; NaN without oscillation."""
     pipes = pipe_parameters(
         line, Liquid(), far=_RINGING_AT, relief_back=0.0, step=step, waves=rung == "wave-lines"
     )
@@ -106,7 +106,7 @@ def _ringing(line: Line, step: float, n_steps: int, rung: str) -> float:
 
 
 def _frequency(rest: Array, step: float) -> float:
-    """Frequency of what swings about zero, from its zeros upward [Hz]; NaN of fewer than three."""
+    """Frequency from upward zero crossings [Hz]; NaN if there are fewer than three."""
     up = np.flatnonzero((rest[:-1] < 0) & (rest[1:] >= 0))
     if len(up) < 3:
         return math.nan
@@ -118,7 +118,7 @@ def _frequency(rest: Array, step: float) -> float:
 
 
 def step_casing(scene: Scene, size: int | None = None) -> MapPlan | str:
-    """Ring of a rigid mechanism with a casing that carries it: step by their masses.
+    """Free vibration of a rigid mechanism on its casing: step by their masses.
 
     Parameters
     ----------
@@ -149,19 +149,19 @@ def step_casing(scene: Scene, size: int | None = None) -> MapPlan | str:
     ).through(own)
     return MapPlan(
         name="step-casing",
-        title=f"ring of a casing of {mode:.4g} Hz with what it carries, step by their masses",
+        title=f"free vibration of a {mode:.4g} Hz casing with its mechanism, step by masses",
         x=x,
         y=y,
         judges={_YIELDING: _casing_judge(pump, mode)},
         curves={},
         note="frequency against that of both masses on the casing's spring, within "
-        f"{scene.accuracy:.2g}; piston and rod held without play, on a crank that stands",
+        f"{scene.accuracy:.2g}; piston and rod without clearance, crank at rest",
         own=Own(method=_YIELDING, x=step, y=own),
     )
 
 
 _YIELDING = "mechanism in the frame of its bearing"
-_GROWN = 1.5  # of a ring without damping, last over first: it grows
+_GROWN = 1.5  # last over first amplitude without damping, from which it grows
 
 
 def _moving(scene: PumpScene) -> float:
@@ -172,21 +172,21 @@ def _casing_judge(scene: PumpScene, mode: float) -> Judge:
     def judge(step: float, ratio: float) -> Cell:
         exact = mode / math.sqrt(1 + 1 / ratio)
         if step * mode * _LEAST_PER_PERIOD > 1:
-            return Verdict.INACCURATE, "fewer than three steps a period of the casing"
+            return Verdict.INACCURATE, "fewer than three steps per period of the casing"
         force = _casing_ring(scene, mode, ratio, step, math.ceil(_RUNG_PERIODS / (exact * step)))
         quarter = len(force) // 4
         first, last = np.ptp(force[:quarter]), np.ptp(force[-quarter:])
-        if not last < _GROWN * first:  # also where it is no number
+        if not last < _GROWN * first:  # also for NaN
             return Verdict.UNSTABLE, "grows"
         off = abs(_frequency(force - force.mean(), step) / exact - 1)
-        fine = off <= scene.accuracy  # not so where too few periods are told
+        fine = off <= scene.accuracy  # False for NaN, with too few periods
         return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
 
     return judge
 
 
 def _casing_ring(scene: PumpScene, mode: float, ratio: float, step: float, least: int) -> Array:
-    """Force of a rigid crank pin that stands at its dead centre, after a load set in [N]."""
+    """Force of a rigid crank pin at rest at its dead centre, after a sudden load [N]."""
     shape = {"bearing_x": 1 / math.sqrt(ratio * _moving(scene))}
     alone = scene.casing.modes[0].model_copy(
         update={"frequency": mode, "damping_ratio": 0.0, "shape": shape}
@@ -204,7 +204,7 @@ def _casing_ring(scene: PumpScene, mode: float, ratio: float, step: float, least
     t, start = tables_and_start(rigid, step, 0.0)
     bodies = start.bodies.copy()
     bodies[:, 6:] = 0.0
-    with np.errstate(all="ignore"):  # what is unstable overflows: that is the answer
+    with np.errstate(all="ignore"):  # an unstable run overflows, which is the result
         run = run_mechanism(
             t,
             angle=0.0,
@@ -219,4 +219,4 @@ def _casing_ring(scene: PumpScene, mode: float, ratio: float, step: float, least
 
 
 _LEAST_WATCHED = 200  # steps
-_BEGUN = 8  # steps, of which the first have no past to be carried on
+_BEGUN = 8  # initial steps, the first without a history to extrapolate

@@ -1,6 +1,6 @@
-"""The classical steppers of ``x'' = a(x, x')``, each a plain function, and where they end.
+"""Classical steppers of ``x'' = a(x, x')``, each a plain function, and their limits.
 
-No recording is computed with them: they are measured beside the machines' own methods
+Recordings do not use them. They are compared with the machines' own methods
 (:mod:`.mechanism.crank_step` cuts its Runge-Kutta steps where a contact changes,
 :mod:`.journal.orbit_step` has RODAS), and show where the methods of the source papers fail.
 
@@ -22,17 +22,17 @@ Acceleration = Callable[[Array, Array], Array]
 Pair = tuple[Array, Array]
 """Position and velocity."""
 
-_NEWTON_STEPS = 12  # a straight force takes one, a kink up to three; what takes more cycles
+_NEWTON_STEPS = 12  # a linear force takes one, a kink up to three; otherwise it cycles
 _NEWTON_TOLERANCE = 1e-9  # of the acceleration
-_GROWTH = 1e6  # of a free motion: beyond any that a stable method shows on its way down
-_PATIENCE = 4.0  # times the longest contact that there is
+_GROWTH = 1e6  # of a free motion: beyond any transient growth of a stable method
+_PATIENCE = 4.0  # times the longest possible contact
 
 
 # --- steppers
 
 
 def semi_implicit_euler(x: Array, v: Array, acceleration: Acceleration, h: Array) -> Pair:
-    """Velocity first, then position with the new velocity: order 1, the papers' method.
+    """Velocity first, then position with the new velocity: order 1, the method of the papers.
 
     Parameters
     ----------
@@ -46,22 +46,22 @@ def semi_implicit_euler(x: Array, v: Array, acceleration: Acceleration, h: Array
     Returns
     -------
     tuple of numpy.ndarray
-        Position and velocity a step later.
+        Position and velocity after the step.
     """
     v = v + h * acceleration(x, v)
     return x + h * v, v
 
 
 def explicit_midpoint(x: Array, v: Array, acceleration: Acceleration, h: Array) -> Pair:
-    """Slope in the middle of the step: order 2. Arguments as :func:`semi_implicit_euler`."""
+    """Slope in the middle of the step: order 2. Arguments as in :func:`semi_implicit_euler`."""
     middle = v + 0.5 * h * acceleration(x, v)
     return x + h * middle, v + h * acceleration(x + 0.5 * h * v, middle)
 
 
 def velocity_verlet(x: Array, v: Array, acceleration: Acceleration, h: Array) -> Pair:
-    """Half a kick, a drift, half a kick: order 2 without damping, 1 with.
+    """Half kick, drift, half kick: order 2 without damping, 1 with damping.
 
-    Damping takes the velocity before the kick. Arguments as :func:`semi_implicit_euler`.
+    Damping uses the velocity before the kick. Arguments as in :func:`semi_implicit_euler`.
     """
     half = v + 0.5 * h * acceleration(x, v)
     x = x + h * half
@@ -69,7 +69,7 @@ def velocity_verlet(x: Array, v: Array, acceleration: Acceleration, h: Array) ->
 
 
 def runge_kutta_4(x: Array, v: Array, acceleration: Acceleration, h: Array) -> Pair:
-    """The classical method: order 4. Arguments as :func:`semi_implicit_euler`."""
+    """The classical method: order 4. Arguments as in :func:`semi_implicit_euler`."""
     a1 = acceleration(x, v)
     v2 = v + 0.5 * h * a1
     a2 = acceleration(x + 0.5 * h * v, v2)
@@ -83,7 +83,7 @@ def runge_kutta_4(x: Array, v: Array, acceleration: Acceleration, h: Array) -> P
 def implicit_trapezoid(x: Array, v: Array, acceleration: Acceleration, h: Array) -> Pair:
     """Mean of both ends (Newmark's method with 1/4 and 1/2): order 2, stable at any step.
 
-    Newton's method for the acceleration at the end; NaN where it does not settle. Arguments as
+    Newton's method for the acceleration at the end; NaN if it does not converge. Arguments as in
     :func:`semi_implicit_euler`.
     """
     start = acceleration(x, v)
@@ -113,7 +113,7 @@ def euler_limit(damping_ratio: float) -> float:
 
     Notes
     -----
-    A step multiplies by a matrix of determinant ``1 - 2 zeta z`` and trace
+    The matrix of a step has the determinant ``1 - 2 zeta z`` and the trace
     ``2 - 2 zeta z - z^2``, z the step times omega. Jury's condition ``1 + trace + determinant > 0``
     is the binding one: ``z < 2 (sqrt(1 + zeta^2) - zeta)``.
 
@@ -132,7 +132,7 @@ def verlet_limit(damping_ratio: float) -> float:
     -----
     With ``p = zeta z`` the determinant is ``(1 - p)^2`` and the trace
     ``1 + (1 - p)^2 - z^2 (2 - p) / 2``, so that ``z^2 (2 - p) < 4 (1 + (1 - p)^2)`` and ``p < 2``:
-    whichever ends first.
+    the stricter one applies.
 
     Examples
     --------
@@ -151,10 +151,10 @@ def runge_kutta_limit(damping_ratio: float, order: int = 4) -> float:
 
     Notes
     -----
-    A mode of rate s is multiplied by ``1 + hs + ... + (hs)^order / order!`` a step. The limit is
-    where that leaves the unit circle on the ray of the oscillator's faster mode: ``2 sqrt 2``
-    without damping, 2.785 over the faster decay where damping is far beyond critical. The
-    midpoint's is zero without damping.
+    Each step multiplies a mode of rate s by ``1 + hs + ... + (hs)^order / order!``. The limit is
+    where this factor leaves the unit circle on the ray of the oscillator's faster mode:
+    ``2 sqrt 2`` without damping, 2.785 over the faster decay rate at damping far above critical.
+    The limit of the midpoint rule is zero without damping.
 
     Examples
     --------
@@ -180,7 +180,7 @@ class Stepper:
     ----------
     name : str
     order : int
-        Of the error of a smooth motion without damping.
+        Order of the error for a smooth motion without damping.
     step : callable
         ``(x, v, acceleration, h) -> (x, v)``.
     limit : callable
@@ -235,7 +235,7 @@ STEPPERS: tuple[Stepper, ...] = (
 """A new stepper is one row."""
 
 
-# --- limits as measured
+# --- measured limits
 
 
 def decays(
@@ -247,15 +247,15 @@ def decays(
     ----------
     stepper : Stepper
     step, omega, damping_ratio : array_like
-        Step [s], circular frequency [rad/s] and damping ratio of each oscillator, of shapes that
+        Step [s], circular frequency [rad/s] and damping ratio of each oscillator, with shapes that
         broadcast.
     n_steps : int
-        Steps to watch.
+        Number of steps.
 
     Returns
     -------
     numpy.ndarray of bool
-        True where the motion ends bounded.
+        True if the motion stays bounded.
 
     Examples
     --------
@@ -265,13 +265,13 @@ def decays(
     h, w, zeta = (np.array(a, float) for a in np.broadcast_arrays(step, omega, damping_ratio))
     x, v = np.ones_like(h), np.zeros_like(h)
     size = np.ones_like(h)
-    with np.errstate(all="ignore"):  # what grows without bound is the answer
+    with np.errstate(all="ignore"):  # unbounded growth is the result
         for _ in range(n_steps):
             x, v = stepper.step(x, v, lambda p, u: -w * (w * p + 2 * zeta * u), h)
             size = np.hypot(x, v / w)
             if not np.any(size < _GROWTH):
                 break
-    # close below a limit the motion beats: it rises at most by the root of the steps watched
+    # just below a limit the motion beats: it grows at most by the root of the number of steps
     return np.asarray(size < 2 * math.sqrt(n_steps))
 
 
@@ -281,27 +281,27 @@ def decays(
 def bounce(
     stepper: Stepper, step: ArrayLike, stiffness: ArrayLike, damping: ArrayLike, phase: ArrayLike
 ) -> Array:
-    """Speed of separation over speed of approach, of a unit mass on a contact that never pulls.
+    """Restitution (separation over approach speed) of a unit mass on a contact without tension.
 
     Parameters
     ----------
     stepper : Stepper
-        Contact is looked for at its own points only: no step is cut.
+        Contact is detected at its own points only: no step is cut.
     step : array_like
         [s]
     stiffness, damping : array_like
-        Of Kelvin's and Voigt's contact, per mass [1/s^2], [1/s].
+        Stiffness and damping of a Kelvin-Voigt contact per mass [1/s^2], [1/s].
     phase : array_like
-        Part of a step before the surface at which the mass starts, in [0, 1).
+        Initial distance of the mass from the surface, in steps, in [0, 1).
 
     Returns
     -------
     numpy.ndarray
-        NaN where the stepper finds no next point, or the mass does not come back in time.
+        NaN if the stepper finds no next point, or the mass does not return in time.
 
     Examples
     --------
-    Without damping nothing is lost, but for the steps that miss the touch:
+    Without damping nothing is lost, except by steps that miss the instant of contact:
 
     >>> float(bounce(STEPPERS[0], 1e-3, 1.0, 0.0, 0.5).round(3))
     1.0
@@ -317,7 +317,7 @@ def bounce(
     found = np.full_like(h, np.nan)
     # no contact of this law lasts longer than half a period without damping
     n_steps = math.ceil(_PATIENCE * math.pi * float(np.max(1 / (h * np.sqrt(k))))) + 8
-    with np.errstate(all="ignore"):  # what is unstable overflows, and is told by its result
+    with np.errstate(all="ignore"):  # an unstable run overflows, which the result shows
         for _ in range(n_steps):
             x, v = stepper.step(x, v, acceleration, h)
             out = np.isnan(found) & (v < 0) & (acceleration(x, v) == 0)

@@ -1,4 +1,4 @@
-"""Maps of :mod:`.stability.method_map` as plain values and as text; the conclusions first."""
+"""Maps of :mod:`.stability.method_map` as plain values and as text, conclusions first."""
 
 import math
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ def stability_table(scene: Scene, maps: Sequence[StabilityMap]) -> dict[str, Any
     Returns
     -------
     dict
-        Of every map the conclusion, the scene's place in it and the edges about that, axes,
-        verdicts by name, words of the cells that are not simply accurate, theory.
+        For every map: conclusion, position of the scene and edges around it, axes, verdicts by
+        name, explanations of cells that are not accurate, theory.
     """
     return {"scene": scene.name, "maps": [_table(found) for found in maps]}
 
@@ -93,7 +93,7 @@ def _method(found: StabilityMap, name: str) -> dict[str, Any]:
 
 
 def stability_text(scene: Scene, maps: Sequence[StabilityMap]) -> str:
-    """The conclusion of every map, then the shares of its regions, a line a method.
+    """Conclusion of every map, then the shares of its regions, one line per method.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def shares_text(found: StabilityMap, method: str) -> str:
 
 
 def reasons(found: StabilityMap, method: str) -> list[tuple[str, int]]:
-    """Statuses behind the cells that failed, the most frequent first, with how many they are."""
+    """Statuses of the failed cells with their counts, the most frequent first."""
     words = [
         word.partition(":")[0]
         for row, line in zip(found.verdicts[method], found.words[method], strict=True)
