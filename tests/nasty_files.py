@@ -230,10 +230,10 @@ FILES: dict[str, Nasty] = {
     "time backwards": Nasty(
         text("time [s],a [g]\n" + "".join(f"{-i / 1000},1\n" for i in range(40))),
         "x.csv",
-        r"-0.001 \(line 3\) behind 0.0",
+        r"-0.001 \(line 3\) after 0.0",
     ),
     "time stands": Nasty(
-        text("time [s],a [g]\n" + "0.5,1\n" * 40), "x.csv", r"0.5 \(line 3\) behind 0.5"
+        text("time [s],a [g]\n" + "0.5,1\n" * 40), "x.csv", r"0.5 \(line 3\) after 0.5"
     ),
     "negative rate": Nasty(
         healthy_csv,
@@ -303,7 +303,7 @@ FILES: dict[str, Nasty] = {
         healthy_csv, "$x^{ %s '\"`;\\.csv", "not plotted", (*INFO, "--plot", "OUT.svg"), code=0
     ),
     "output to a folder that is none": Nasty(
-        healthy_csv, "x.csv", "absent is no folder", ("import", "FILE", "-o", "OUT/absent/x.h5")
+        healthy_csv, "x.csv", "absent is not a folder", ("import", "FILE", "-o", "OUT/absent/x.h5")
     ),
     "output over the input": Nasty(
         healthy_csv, "x.csv", "is also an input", ("import", "FILE", "-o", "FILE", "--force")

@@ -443,7 +443,9 @@ def test_the_command_exits_1_on_a_fault(copy):
     broken = run("info", copy, "--verify")
     assert broken.exit_code == 1
     assert "NOT SOUND" in broken.stdout
-    assert "fault  grade      records 1, 5: grade must be -1 to 3; mend the label" in broken.stdout
+    assert (
+        "fault  grade      records 1, 5: grade must be -1 to 3; correct the label" in broken.stdout
+    )
     table = json.loads(run("info", copy, "--verify", "--json").stdout)
     assert (table["sound"], table["records"]) == (False, N)
     assert table["findings"][0]["records"] == [1, 5]

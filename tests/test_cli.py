@@ -175,7 +175,7 @@ def test_outputs_are_not_overwritten_nor_half_written(tmp_path, small_set, small
         refused(*command, there, says=["exists; choose another name or use --force"])
         assert there.read_text() == "mine"
         there.unlink()
-    refused("simulate", "bilge-pump", "-o", tmp_path / "no" / "x.h5", says=["is no folder"])
+    refused("simulate", "bilge-pump", "-o", tmp_path / "no" / "x.h5", says=["is not a folder"])
     assert list(tmp_path.iterdir()) == []
 
 

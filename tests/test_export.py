@@ -240,8 +240,8 @@ def test_a_rate_that_wav_cannot_hold_is_refused(mixed, tmp_path):
         ("a.npz", {"kind": "flac"}, "kind = 'flac' must be one of h5, parquet, npz, wav, csv"),
         ("a", {"kind": "wav", "compress": True}, "compress must be left out of wav: it is"),
         ("a.npz", {"signals": True}, "signals must be left out of npz, which"),
-        ("no/a.npz", {}, "is no folder; create it"),
-        ("no/a", {"kind": "csv"}, "is no folder; create it"),
+        ("no/a.npz", {}, "is not a folder; create it"),
+        ("no/a", {"kind": "csv"}, "is not a folder; create it"),
     ],
 )
 def test_a_contradictory_request_is_refused(mixed, tmp_path, name, options, message):

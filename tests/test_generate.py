@@ -587,7 +587,7 @@ def test_all_faults_at_once(tmp_path):
         'name = "mine"', ""
     )
     assert faults_of(text, tmp_path) == [
-        "name is missing (of the recipe, kept in the data set); add it",
+        "name is missing (name of the recipe, kept in the data set); add it",
         "records = 0 must be >= 1 (number of records by default)",
         "record_per_group is an unknown key; did you mean 'records_per_group'?",
     ]

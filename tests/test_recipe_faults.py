@@ -641,7 +641,7 @@ def test_a_name_is_never_taken_over(tmp_path):
     """It decides the seeds: two recipes of one name would draw the same machines."""
     file = tmp_path / "m.toml"
     file.write_text('extends = "bilge-pump-narrow"\n')
-    assert faults_of(file) == ["name is missing (of the recipe, kept in the data set); add it"]
+    assert faults_of(file) == ["name is missing (name of the recipe, kept in the data set); add it"]
 
 
 def test_faults_in_lists_of_the_wrong_kind_are_reported_not_merged(tmp_path):

@@ -153,7 +153,9 @@ def test_a_disk_that_runs_full_is_told_and_the_file_goes_on(path, monkeypatch):
         writer.write(0, signal_of(0), ROW)
         with monkeypatch.context() as patch:
             patch.setattr(h5py.File, "flush", full)
-            message = r"data\.h5\.part cannot be written \(No space left on device\); mend the disk"
+            message = (
+                r"data\.h5\.part cannot be written \(No space left on device\); repair the disk"
+            )
             with pytest.raises(WriteError, match=message):
                 writer.write(1, signal_of(1), ROW)
         assert writer.done.tolist() == [True, False, False, False, False]
@@ -192,7 +194,7 @@ def test_a_write_that_fails_leaves_nothing_that_closing_fails_over(path, what):
     command = [sys.executable, "-P", "-c", LIMITED, str(path), what]
     run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=180)
     assert run.returncode == 0, run.stderr  # HDF5 has ended such a process by a fault of memory
-    assert "data.h5.part cannot be written (File too large); mend the disk" in run.stdout
+    assert "data.h5.part cannot be written (File too large); repair the disk" in run.stdout
     with DataSetWriter(path, HEAD, n_records=5, n_samples=9000) as writer:
         assert writer.done.tolist() == [False] * 4 + [True]
 

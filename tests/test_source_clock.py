@@ -72,13 +72,13 @@ def test_stamps_that_repeat_are_named_with_their_lines(tmp_path):
     texts[50], texts[120] = texts[49], texts[119]
     message = refusal(written(tmp_path / "x.csv", texts))
     # a header, and lines are counted from one
-    for part in ("do not at 2 of 200", f"{texts[50]} (line 52) behind {texts[49]} (line 51)"):
+    for part in ("do not at 2 of 200", f"{texts[50]} (line 52) after {texts[49]} (line 51)"):
         assert part in message
     assert "(line 122)" in message
     numbers = [f"{i / 1000:.3f}" for i in range(20)]
     numbers[5] = numbers[4]
     path = written(tmp_path / "y.csv", numbers, header="time [s],acc [g]\n")
-    assert "0.004 (line 7) behind 0.004 (line 6)" in refusal(path)
+    assert "0.004 (line 7) after 0.004 (line 6)" in refusal(path)
     coarse = [text[:-7] for text in stamps("%H:%M:%S.%f")]  # whole seconds, 100 samples in each
     message = refusal(written(tmp_path / "z.csv", coarse))
     assert "(they are printed to 1 only), do not at 198 of 200" in message

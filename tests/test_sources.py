@@ -386,7 +386,7 @@ def test_mat5_bombs_and_depths(tmp_path, monkeypatch):
     for _ in range(50):
         nest = matrix(1, (1, 1), b"", nest)
     path.write_bytes(mat_header() + nest)
-    assert "lie more than 32 deep" in refusal(path)
+    assert "are nested more than 32 deep" in refusal(path)
 
 
 def mfpt(path, **fields):
@@ -1069,7 +1069,7 @@ def test_raw_layouts_at_fault(tmp_path):
         (whole, "33 byte behind offset 0 must be a multiple >= 1 of 4"),
         ({**whole, "offset": 33}, "0 byte behind offset 33"),
         ({**whole, "offset": 34}, "-1 byte behind offset 34"),
-        ({**whole, "dtype": "int16"}, "must say its byte order; write '<int16'"),
+        ({**whole, "dtype": "int16"}, "must include its byte order; write '<int16'"),
         ({**whole, "dtype": "<complex64"}, "must be one of int8"),
         ({**whole, "offset": 1, "order": None}, "order must be 'interleaved'"),
         ({**whole, "offset": 1, "channels": ("a",)}, "must name all 2 channels"),

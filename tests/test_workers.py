@@ -109,15 +109,15 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     function = OnceAt3(str(tmp_path / "died"))
     found = list(in_order(function, range(8), jobs=2, say=told.append))
     assert found == [0, 1, 2, -3, 4, 5, 6, 7]
-    assert told == ["a worker process died; what it had in hand is done again"]
+    assert told == ["a worker process died; its items are repeated"]
 
 
 def test_a_worker_that_dies_with_half_a_result_sent_is_replaced(tmp_path, monkeypatch):
-    monkeypatch.setattr(workers, "UNHEARD", 0.5)
+    monkeypatch.setattr(workers, "OVERDUE", 0.5)
     told = []
     work = HalfAt1(str(tmp_path / "half"))
     assert list(in_order(work, range(4), jobs=2, say=told.append)) == [0, 1, 2, 3]
-    assert told == ["a worker process died; what it had in hand is done again"]
+    assert told == ["a worker process died; its items are repeated"]
 
 
 def test_a_stop_does_not_wait_for_half_a_result(tmp_path):

@@ -1,4 +1,4 @@
-"""Is a data set fit to train and judge on: leaks, copies, splits that share machines."""
+"""Fitness of a data set for training and testing: leaks, copies, splits that share machines."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -42,7 +42,7 @@ CHECKS: dict[str, Callable[[AuditTable], Iterator[Finding]]] = {
     "copied rows": row_copies,
     "machines on both sides of a split": shared_machines,
 }
-"""What is looked for in every table -> the check. A new one is one row."""
+"""Checks of every table, by their description. A new one is one row."""
 
 UNSEEN = (
     "whether training and test rows were scaled with common numbers: afterwards it does not show",
@@ -51,14 +51,14 @@ UNSEEN = (
     "relations of three or more columns, powers, and models that combine weak columns",
     "labels that are wrong",
 )
-"""What no finding can say."""
+"""Faults that no check can find."""
 
 _ORDER: dict[Severity, int] = {"alarm": 0, "warning": 1, "note": 2}
 
 
 @dataclass(frozen=True, kw_only=True)
 class AuditSource:
-    """What one file of an audit is.
+    """One file of an audit.
 
     Attributes
     ----------
@@ -67,17 +67,17 @@ class AuditSource:
     kind : {"data set", "table"}
         With signals, or columns alone.
     side : {"train", "test", ""}
-        What it is said to be for.
+        Intended use; empty if not given.
     rows, columns : int
-        Rows or usable records; columns that were looked at.
+        Rows or usable records; columns that were checked.
     label : str
-        Empty where none is known.
+        Name of the label; empty if none is known.
     classes : dict of str to int
-        Rows of each class.
+        Number of rows by class.
     machines : int or None
-        None where none are known.
+        Number of machines; None if unknown.
     splits : tuple of str
-        Splits that were looked at.
+        Splits that were checked.
     """
 
     path: Path
@@ -93,18 +93,18 @@ class AuditSource:
 
 @dataclass(frozen=True, kw_only=True)
 class Audit:
-    """What an audit found.
+    """Result of an audit.
 
     Attributes
     ----------
     sources : tuple of AuditSource
-        What was looked at.
+        Files that were audited.
     findings : tuple of Finding
-        The worst first.
+        Findings, the worst first.
     checked : tuple of str
-        What was looked for.
+        Descriptions of the checks made.
     unchecked : tuple of str
-        What could not be, and what would make it possible.
+        Checks that were impossible, and what they need.
     """
 
     sources: tuple[AuditSource, ...]
@@ -114,14 +114,14 @@ class Audit:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst severity; notes are no fault."""
+        """The worst severity; notes do not count."""
         found = {finding.severity for finding in self.findings}
         return "alarm" if "alarm" in found else "warning" if "warning" in found else "clean"
 
 
 @dataclass
 class _Looked:
-    """Everything read of one file."""
+    """All data read from one file."""
 
     path: Path
     side: str
@@ -140,14 +140,14 @@ def audit(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Audit:
-    """Audit data sets and plain tables, each by itself and against the others.
+    """Audit data sets and plain tables, each separately and against the others.
 
     Parameters
     ----------
     paths : sequence of str or Path
         Data sets (.h5) and tables (.csv, .tsv, .txt, .parquet, .h5 of columns).
     roles : Roles
-        Which columns are label, machine, split and nuisance, the same in every file.
+        Roles of columns (label, machine, split, nuisance), the same in every file.
     train, test : sequence of str or Path
         Further files, which are the two sides of one experiment.
     jobs : int
@@ -158,12 +158,12 @@ def audit(
     Returns
     -------
     Audit
-        Findings, the worst first.
+        Audit with its findings, the worst first.
 
     Raises
     ------
     DataError
-        A file cannot be read, or is given twice; a role is not there.
+        If a file cannot be read or is given twice, or a role is missing.
 
     Examples
     --------
@@ -200,17 +200,18 @@ def audit(
 
 
 def table_findings(table: AuditTable) -> list[Finding]:
-    """Every finding about one table.
+    """All findings about one table.
 
     Parameters
     ----------
     table : Table
-        With or without label, machines and splits; what needs one that is missing is left out.
+        Table with or without label, machines and splits; checks that need a missing one are left
+        out.
 
     Returns
     -------
     list of Finding
-        In the order of `CHECKS`.
+        Findings in the order of `CHECKS`.
 
     Examples
     --------
@@ -247,7 +248,7 @@ def _looked(
     data = stack.enter_context(DataSet(path))
     if not (data.manifest["status"] == "ok").any():
         raise DataError(f"{path}: 0 usable records, must be > 0; see its column 'status'")
-    manifest_table(data, roles, (), np.empty((0, 0)))  # roles are refused before all is read
+    manifest_table(data, roles, (), np.empty((0, 0)))  # refuse wrong roles before reading all
     kept = sketch(data, jobs=jobs, progress=progress)
     table = manifest_table(data, roles, kept.names, kept.measures)
     return _Looked(path=path, side=side, table=table, data=data, kept=kept)
@@ -320,7 +321,7 @@ def _record_findings(looked: Sequence[_Looked]) -> Iterator[Finding]:
 
 
 def _within(item: _Looked, found: Sequence[Copy], rows: Any, whole: bool) -> Finding:
-    """Copies in one data set: an alarm where they part a split or two machines."""
+    """Copies in one data set: an alarm if they lie on both sides of a split or in two machines."""
     across = crossing(item.table.sides, rows)
     groups = item.table.groups
     machines = 0 if groups is None else int((groups[rows[:, 0]] != groups[rows[:, 1]]).sum())
@@ -344,7 +345,7 @@ def _within(item: _Looked, found: Sequence[Copy], rows: Any, whole: bool) -> Fin
         },
         what=f"{len(found)} pair(s) of records {what}, first {found[0].first[1]} and "
         f"{found[0].second[1]}" + "".join(f"; {text}" for text in said),
-        means="the test asks for what training has heard: figures are too good"
+        means="test signals were seen in training: the figures are too good"
         if across
         else "records of two machines are one recording, so that no split by machine parts them"
         if machines
@@ -361,7 +362,7 @@ def _listed(found: Sequence[Copy]) -> list[list[int]]:
 
 
 def _between(one: _Looked, two: _Looked, code: str, count: int, shown: Any) -> Finding:
-    """The same rows, signals or machines in two files: an alarm if one trains and one tests."""
+    """Identical rows, signals or machines in two files: an alarm if one trains and one tests."""
     sides = {one.side, two.side} == {"train", "test"}
     what = {"copied-signals": "record", "copied-rows": "row", "shared-machines": "machine"}[code]
     return Finding(
@@ -370,7 +371,7 @@ def _between(one: _Looked, two: _Looked, code: str, count: int, shown: Any) -> F
         where=f"{one.path.name} and {two.path.name}",
         numbers={"shared": count, "first": shown},
         what=f"{count} {what}(s) are in both files",
-        means="the test asks about what training has seen: figures are too good"
+        means="test data were seen in training: the figures are too good"
         if sides
         else "together they hold less than it seems; one must not train while the other tests",
         cure="leave them out of one file, or draw other machines with another seed",
@@ -394,7 +395,7 @@ def _between_tables(looked: Sequence[_Looked]) -> Iterator[Finding]:
 
 
 def _between_draws(looked: Sequence[_Looked]) -> Iterator[Finding]:
-    """Machines that two simulated sets drew alike: from one recipe, or from another's machines."""
+    """Machines drawn alike in two simulated sets: from one recipe, or from another's machines."""
     sets = [(item, item.data) for item in looked if item.data is not None]
     for (one, first), (two, second) in combinations(sets, 2):
         origin, other = (

@@ -1,4 +1,4 @@
-"""Columns, and pairs of them, that were made with the label: constant or scaled by class."""
+"""Columns and pairs of columns that were made with the label: constant or scaled by class."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ Bool = NDArray[np.bool_]
 Pairs = NDArray[np.intp]
 
 EXACT = 1e-6
-"""A column is constant within a class where it varies by less than this share of its size."""
+"""Variation within a class, relative to size, below which a column counts as constant [-]."""
 
 _ONE_EXTREME = "largest magnitude"
 _UNLESS_BOUND = "unless that value is a floor or ceiling of the column, "
-_MOSTLY = 0.9  # of the rows, that have a value of their own where a column is measured
-_COARSEST = 4  # significant digits: a column with fewer says nothing about cancelling
-_CANCELLED = 1 / 30  # of what either column varies by, the most that a constant pair may leave
-_PROBES = 4  # random projections that a pair must agree in before it is compared whole
+_MOSTLY = 0.9  # of the rows have a distinct value in a measured column
+_COARSEST = 4  # significant digits: a column with fewer is not checked for cancelling
+_CANCELLED = 1 / 30  # of the variation of either column: the largest remainder of a constant pair
+_PROBES = 4  # random projections in which a pair must agree before it is fully compared
 
 
 @dataclass(frozen=True)
 class _Labelled:
-    """Finite columns of the rows whose class has enough of them."""
+    """Finite columns of the rows whose class has enough rows."""
 
     names: tuple[str, ...]
     values: Float
@@ -34,7 +34,7 @@ class _Labelled:
 
     @property
     def tolerance(self) -> Float:
-        """Relative, of each column."""
+        """Relative tolerance of each column."""
         return np.maximum(EXACT, 2 * self.rounding)
 
     def spread(self, values: Float) -> Float:
@@ -47,7 +47,7 @@ class _Labelled:
 
 
 def _labelled(table: AuditTable) -> _Labelled | None:
-    """None where fewer than two classes have enough rows."""
+    """Labelled columns; None if fewer than two classes have enough rows."""
     if table.label is None:
         return None
     counts = np.bincount(table.label, minlength=len(table.classes))
@@ -67,12 +67,12 @@ def _labelled(table: AuditTable) -> _Labelled | None:
 
 
 def resolution(values: Float) -> Float:
-    """Relative rounding of each column, as from text with few digits; 0 where none shows.
+    """Relative rounding of each column, as from text with few digits; 0 if none is visible.
 
     Parameters
     ----------
     values : numpy.ndarray [shape=(n_rows, n_columns)]
-        Finite.
+        Columns, finite.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def resolution(values: Float) -> Float:
 
 
 def constant_columns(table: AuditTable) -> Iterator[Finding]:
-    """Columns that have one value in every class, or one of their own in some class."""
+    """Columns with one value per class, or with a value in some class that others do not have."""
     data = _labelled(table)
     if data is None:
         return
@@ -118,19 +118,19 @@ def constant_columns(table: AuditTable) -> Iterator[Finding]:
             numbers={"columns": len(own)},
             what=f"{named(names)} {has(own)} one fixed value in at least one class of "
             f"{table.label_name}, which other classes do not have",
-            means="that class can be read from the value; it may be physics (a count of zero) or "
-            "a trace of how the class was recorded",
-            cure="look where the value is from; leave the column out unless physics explains it",
+            means="the class can be read from the value; this may be physics (a count of zero) "
+            "or a trace of how the class was recorded",
+            cure="check the origin of the value; leave the column out unless physics explains it",
         )
 
 
 def _is_own_value(data: _Labelled, column: int, still: Bool, tolerance: float) -> bool:
-    """True where a class's only value is next to absent from the others."""
+    """Whether the only value of a class is almost absent from the others."""
     for number in np.flatnonzero(still):
         rows = data.rows[number]
         others = np.concatenate([r for k, r in enumerate(data.rows) if k != number])
         near = np.abs(data.values[others, column] - data.values[rows[0], column]) <= tolerance
-        if rows.size >= 10 and near.mean() <= 0.01:  # ten rows alike are no accident
+        if rows.size >= 10 and near.mean() <= 0.01:  # ten equal rows are no coincidence
             return True
     return False
 
@@ -161,7 +161,7 @@ def cancelling_pairs(table: AuditTable) -> Iterator[Finding]:
 def _cancelling(
     data: _Labelled, values: Float, tolerance: Float, allowed: Bool, sign: int
 ) -> list[tuple[int, int]]:
-    """Pairs whose class means differ while what is left within the classes cancels."""
+    """Pairs whose class means differ while the variation within the classes cancels."""
     means = data.means(values)
     left = np.empty_like(values)
     for mean, rows in zip(means, data.rows, strict=True):
@@ -182,26 +182,26 @@ def _cancelling(
 def close_pairs(vectors: Float, tolerance: Float, *, sign: int = 1) -> Pairs:
     """Pairs of vectors that are equal, or opposite, to a tolerance in every element.
 
-    Sorting by random projections finds them without comparing all pairs: the time grows about
-    in proportion to the number of vectors where few are close.
+    Sorting by random projections finds them without comparing all pairs: the time grows about in
+    proportion to the number of vectors if few are close.
 
     Parameters
     ----------
     vectors : numpy.ndarray [shape=(n_vectors, n_elements)]
     tolerance : numpy.ndarray [shape=(n_vectors,)]
-        Of each vector's elements [unit of `vectors`]; those of the two of a pair add up.
+        Tolerance of each vector's elements [unit of `vectors`]; those of a pair add up.
     sign : {1, -1}
         1 for equal, -1 for opposite.
 
     Returns
     -------
     numpy.ndarray [shape=(n_pairs, 2)]
-        Numbers of the vectors, the lower first.
+        Indices of the vectors, the lower first.
 
     Notes
     -----
-    An error of `tolerance` in every element moves a projection by `tolerance` times the root of
-    the number of elements on average; six times that is allowed.
+    An error of `tolerance` in every element moves a projection on average by `tolerance` times the
+    root of the number of elements; six times that is allowed.
 
     Examples
     --------
@@ -228,9 +228,9 @@ def close_pairs(vectors: Float, tolerance: Float, *, sign: int = 1) -> Pairs:
 def _neighbours(
     values: Float, reach: Float, sign: int
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Pairs of numbers that are equal, or opposite, within reach; a step further at a time."""
+    """Pairs of numbers that are equal, or opposite, within reach, by distance in the list."""
     n = values.size
-    # opposite ones are next to each other when each number is in the list with both signs
+    # with both signs of each number in the list, opposite ones are adjacent
     listed = values if sign == 1 else np.concatenate([values, -values])
     order = np.argsort(listed)
     far = 2 * reach.max()
@@ -271,9 +271,9 @@ def _leak(
         what=f"{len(groups)} {kind}{'s' * (len(groups) > 1)}"
         + (" of two columns" if len(groups[0]) > 1 else "")
         + f": constant within each class of {table.label_name}, different between them",
-        means=f"{many} says the class without any physics: something was computed over a whole "
-        "class, so the label was used to make the columns",
-        cure="leave these columns out, or compute them for each recording by itself",
+        means=f"{many} gives the class without any physics: something was computed over a whole "
+        "class, so that the label was used to make the columns",
+        cure="leave these columns out, or compute them for each recording separately",
     )
 
 
@@ -325,16 +325,16 @@ def class_scaled(table: AuditTable) -> Iterator[Finding]:
 
 
 def _is_measured(data: _Labelled) -> Bool:
-    """Columns with as good as a value of its own in every row.
+    """Columns with a distinct value in almost every row.
 
-    A value that belongs to a machine comes again in each class that the machine is in.
+    A value that belongs to a machine recurs in each class of that machine.
     """
     distinct = np.array([np.unique(column).size for column in data.values.T])
     return distinct > _MOSTLY * len(data.values)
 
 
 def _scaling(data: _Labelled, column: int) -> str:
-    """What is the same in every class; empty where nothing is, to what chance allows."""
+    """Statistics that are the same in every class beyond chance; empty if there are none."""
     parts = [data.values[rows, column] for rows in data.rows]
     spread = float(np.sqrt(np.mean([part.var() for part in parts])))
     if spread == 0:
@@ -343,10 +343,10 @@ def _scaling(data: _Labelled, column: int) -> str:
     coarse = float(data.rounding[column]) * size / spread
     rows = min(part.size for part in parts)
     for name, measures in _MEASURES:
-        # numbers of n rows agree to a share d of their deviation with probability <= d sqrt(n)
+        # statistics of n rows agree to a share d of their deviation with probability <= d sqrt(n)
         chance = float((BY_CHANCE / len(data.names)) ** (1 / len(measures)) / np.sqrt(rows))
         if coarse > chance and name.endswith(("value", "magnitude")):
-            continue  # rounded, two extremes are equal by chance
+            continue  # with rounding, two extremes may be equal by chance
         bound = min(max(EXACT, coarse), chance)
         numbers = np.array([[measure(part) for measure in measures] for part in parts])
         if (np.ptp(numbers, axis=0) <= bound * spread).all() and _alone(parts, name, bound, spread):
@@ -355,7 +355,7 @@ def _scaling(data: _Labelled, column: int) -> str:
 
 
 def _alone(parts: Sequence[Float], name: str, bound: float, spread: float) -> bool:
-    """False where the extremes are a bound that many values come close to, as in a saturation."""
+    """False if the extremes are a bound that many values approach, as in a saturation."""
     if not name.endswith(("value", "magnitude")):
         return True
     gaps = []
@@ -402,4 +402,4 @@ _MEASURES: tuple[tuple[str, tuple[Callable[[Float], float], ...]], ...] = (
     ("rms", (_rms,)),
     (_ONE_EXTREME, (_peak,)),
 )
-"""What scaling makes the same in every class -> the numbers that are compared."""
+"""Statistics that a scaling equalises in every class, and the functions that compute them."""

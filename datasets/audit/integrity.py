@@ -1,6 +1,6 @@
-"""Whether a data set file is what it says: every hash, range, group and duplicate.
+"""Integrity of a data set file: hashes, ranges, groups and duplicates.
 
-A fault is a thing that makes a label or a signal wrong. A note is what a user ought to know.
+A fault makes a label or a signal wrong. A note is something that a user should know.
 """
 
 import math
@@ -31,18 +31,18 @@ _ROUNDING = 1e-9  # of bounds that were converted from other units
 
 @dataclass(frozen=True, kw_only=True)
 class IntegrityFinding:
-    """One thing found.
+    """One finding.
 
     Attributes
     ----------
     severity : {"fault", "note"}
         Whether it makes the file unsound.
     check : str
-        What was looked at.
+        Name of the check.
     text : str
-        What is wrong, and the cure.
+        Description of the fault, and the cure.
     records : tuple of int
-        Where; empty if it is about the file.
+        Records concerned; empty if it is about the file.
     """
 
     severity: Literal["fault", "note"]
@@ -53,18 +53,18 @@ class IntegrityFinding:
 
 @dataclass(frozen=True, kw_only=True)
 class Checked:
-    """What came of checking a file.
+    """Result of the check of a file.
 
     Attributes
     ----------
     path : Path
         The file.
     n_records, n_failed : int
-        Records in it, and those whose status is not ``ok``; 0 where it could not be opened.
+        Records in it, and those whose status is not ``ok``; 0 if it could not be opened.
     n_bytes : int
-        Of signal that was read.
+        Size of the signals read.
     findings : tuple of IntegrityFinding
-        Faults first.
+        Findings, faults first.
     """
 
     path: Path
@@ -75,7 +75,7 @@ class Checked:
 
     @property
     def sound(self) -> bool:
-        """No fault was found."""
+        """Whether no fault was found."""
         return all(finding.severity != "fault" for finding in self.findings)
 
 
@@ -87,7 +87,7 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
     path : str or Path
         A finished file.
     progress : callable, optional
-        Called with (records read, records in all).
+        Called with (records read, records in total).
 
     Returns
     -------
@@ -96,12 +96,12 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
     Raises
     ------
     DataError
-        There is no such file.
+        If there is no such file.
 
     Notes
     -----
-    Memory holds the manifest and one record. A file that cannot be opened has that as its only
-    finding. Hidden quantities (``truth``) have no checksum and are not looked at.
+    Memory holds the manifest and one record. If a file cannot be opened, that is the only finding.
+    Hidden quantities (``truth``) have no checksum and are not checked.
 
     Examples
     --------
@@ -136,23 +136,23 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
     )
 
 
-# --- what is looked at --------------------------------------------------------------------------
+# --- data of the checks -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Signals:
-    """What the signals showed [shape=(n_records,)]."""
+    """Properties of the signals [shape=(n_records,)]."""
 
     damaged: Flags
     infinite: Flags
     zero: Flags
     constant: Flags
     n_bytes: int
-    doubts: Mapping[str, Sequence[tuple[int, str]]]  # check -> records and what is told of each
+    doubts: Mapping[str, Sequence[tuple[int, str]]]  # records and their messages, by check
 
 
 def _read_signals(data: DataSet, progress: Callable[[int, int], None] | None) -> _Signals:
-    """Look at every signal once, in the order of the file."""
+    """Read every signal once, in the order of the file."""
     n = len(data)
     flags = np.zeros((4, n), dtype=bool)
     doubts: dict[str, list[tuple[int, str]]] = {}
@@ -184,9 +184,9 @@ def _read_signals(data: DataSet, progress: Callable[[int, int], None] | None) ->
 
 
 def _speeds(rows: NDArray[np.void]) -> NDArray[np.float64]:
-    """Speed of every record by the manifest, its mean before the one set [Hz]; NaN without."""
+    """Speed of every record by the manifest, the measured mean if present [Hz]; NaN without."""
     found = np.full(len(rows), math.nan)
-    for name in _SPEEDS:  # the last one has the last word
+    for name in _SPEEDS:  # the last one present wins
         if name in (rows.dtype.names or ()):
             told = np.asarray(rows[name], dtype=float)
             known = np.isfinite(told) & (told > 0)
@@ -195,7 +195,7 @@ def _speeds(rows: NDArray[np.void]) -> NDArray[np.float64]:
 
 
 def _signal_flags(signal: NDArray[np.float32], checksum: int) -> tuple[bool, bool, bool, bool]:
-    low, high = signal.min(axis=1), signal.max(axis=1)  # not finite where a sample is not
+    low, high = signal.min(axis=1), signal.max(axis=1)  # not finite if a sample is not
     still = low == high
     return (
         signal_checksum(signal) != checksum,
@@ -206,7 +206,7 @@ def _signal_flags(signal: NDArray[np.float32], checksum: int) -> tuple[bool, boo
 
 
 class _Seen:
-    """A file with what its signals showed and what its recipe says."""
+    """A file with the properties of its signals and its recipe."""
 
     def __init__(self, data: DataSet, signals: _Signals) -> None:
         self.data = data
@@ -219,7 +219,7 @@ class _Seen:
 
     @cached_property
     def recipe(self) -> Recipe | str:
-        """The recipe, or why the texts in the file give none; empty where there is no text."""
+        """The recipe, or why the texts in the file give none; empty if there is no text."""
         if not self.head.recipe:
             return ""
         try:
@@ -254,7 +254,7 @@ def _check_hashes(seen: _Seen) -> Iterator[IntegrityFinding]:
     if seen.data.unhashed:
         text = (
             f"the file has no {' and no '.join(seen.data.unhashed)}, so that altered labels are "
-            "not found; it was made before there were such: export it to .h5 to add them"
+            "not found; it was made before hashes were added: export it to .h5 to add them"
         )
         yield IntegrityFinding(severity="note", check="hash", text=text)
 
@@ -282,7 +282,7 @@ def _check_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
 
 
 def _check_equal_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
-    """Records that are the same, byte for byte, whatever their labels."""
+    """Records that are identical in every byte, whatever their labels."""
     usable = seen.ok & ~seen.signals.damaged & ~seen.signals.zero
     first: dict[int, list[int]] = {}
     equal = np.zeros(len(usable), dtype=bool)
@@ -291,7 +291,7 @@ def _check_equal_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
     checksums = seen.rows["signal_crc32"].tolist()
     for index in np.flatnonzero(usable).tolist():
         others = first.setdefault(checksums[index], [])
-        # of 100,000 records two have the same checksum by chance: look at them
+        # of 100,000 records two have the same checksum by chance: compare them
         twin = next((other for other in others if _same_signal(seen.data, other, index)), None)
         if twin is None:
             others.append(index)
@@ -333,7 +333,7 @@ def _check_status(seen: _Seen) -> Iterator[IntegrityFinding]:
 
 
 def _check_numbers(seen: _Seen) -> Iterator[IntegrityFinding]:
-    """Finite, known where they must be, and of the right sign."""
+    """Numbers must be finite, known if required, and of the right sign."""
     for name in seen.columns:
         if seen.rows.dtype[name].kind != "f":
             continue
@@ -345,30 +345,30 @@ def _check_numbers(seen: _Seen) -> Iterator[IntegrityFinding]:
             text = f"{name} is not a number, must be known; generate it again"
             yield from _fault("number", text, np.isnan(values) & seen.ok)
     for name in [name for name in seen.head.severities if name in seen.columns]:
-        yield from _fault("number", f"{name} must be >= 0; mend the label", seen.rows[name] < 0)
+        yield from _fault("number", f"{name} must be >= 0; correct the label", seen.rows[name] < 0)
     for name in [name for name in _SPEEDS if name in seen.columns]:
         wrong = seen.ok & (seen.rows[name] <= 0)
-        yield from _fault("number", f"{name} must be > 0; mend the label", wrong)
+        yield from _fault("number", f"{name} must be > 0; correct the label", wrong)
 
 
 _SPEEDS = ("speed_hz", "mean_speed_hz")
 
 
 def _must_be_known(seen: _Seen) -> frozenset[str]:
-    """Columns in which a simulated record has no gap; of a measured one anything may be unknown."""
+    """Columns without gaps in a simulated record; in a measured one anything may be unknown."""
     if not seen.simulated:
         return frozenset()
     drawn = frozenset(seen.recipe.columns) if isinstance(seen.recipe, Recipe) else frozenset()
     return (drawn | frozenset(seen.head.severities)) - _MAY_END
 
 
-_MAY_END = frozenset({"remaining_life_h"})  # unknown where maintenance keeps it from its end
+_MAY_END = frozenset({"remaining_life_h"})  # unknown if maintenance prevents the end of life
 
 
 def _check_grades(seen: _Seen) -> Iterator[IntegrityFinding]:
     grades = np.asarray(seen.rows["grade"], dtype=int)
     yield from _fault(
-        "grade", "grade must be -1 to 3; mend the label", (grades < -1) | (grades > 3)
+        "grade", "grade must be -1 to 3; correct the label", (grades < -1) | (grades > 3)
     )
     edges = seen.head.grade_edges
     if not edges or not seen.head.severities:
@@ -378,12 +378,12 @@ def _check_grades(seen: _Seen) -> Iterator[IntegrityFinding]:
     known = np.isfinite(values) & (values >= 0)
     wanted = np.array([grade(v, edges) if k else -1 for v, k in zip(values, known, strict=True)])
     shown = ", ".join(f"{edge:g}" for edge in edges)
-    text = f"grade must be what {name} and the limits {shown} m make it; mend the label"
+    text = f"grade must be what {name} and the limits {shown} m make it; correct the label"
     yield from _fault("grade", text, known & (grades != wanted))
 
 
 def _check_recipe(seen: _Seen) -> Iterator[IntegrityFinding]:
-    """Every drawn value within what its recipe says."""
+    """Every drawn value must be within the range of its recipe."""
     recipe = seen.recipe
     if isinstance(recipe, str):
         if recipe:
@@ -404,7 +404,7 @@ Bands = Sequence[tuple[float, float]]
 
 
 def _bands(recipe: Recipe) -> dict[str, Bands]:
-    """Manifest column -> ranges that it was drawn from."""
+    """Ranges from which manifest columns were drawn."""
     found: dict[str, Bands] = {wear.column: wear.axis.bands for wear in recipe.severities}
     columns = {path: column for column, path in recipe.conditions.items()}
     for axis in (*recipe.machine, *recipe.record):
@@ -426,7 +426,7 @@ def _bands_text(bands: Bands) -> str:
 
 
 def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
-    """Value of a fault in its range where it is present, 0 where it is absent."""
+    """The value of a fault must be in its range if present, and 0 if absent."""
     for fault in recipe.faults:
         presence, value = fault.columns
         if not {presence, value} <= set(seen.columns):
@@ -442,10 +442,10 @@ def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding
 
 
 def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
-    """What is drawn per machine is the same in all records of a machine."""
+    """Values drawn per machine must be the same in all records of a machine."""
     most = recipe.table.records_per_group
     groups, inverse, counts = np.unique(seen.rows["group"], return_inverse=True, return_counts=True)
-    text = f"group has more than the {most} record(s) that the recipe says; generate it again"
+    text = f"group has more than the {most} record(s) of the recipe; generate it again"
     yield from _fault("group", text, counts[inverse] > most)
     for name in _machine_columns(recipe) & set(seen.columns):
         values = seen.numbers(name)
@@ -457,7 +457,7 @@ def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
 
 
 def _check_lives(seen: _Seen) -> Iterator[IntegrityFinding]:
-    """Records of a machine in the order in which it aged."""
+    """Records of a machine must be in order of age."""
     if _HOURS in seen.columns:
         hours, groups = seen.numbers(_HOURS), seen.rows["group"]
         back = (groups[1:] == groups[:-1]) & (hours[1:] < hours[:-1])
@@ -476,7 +476,7 @@ def _machine_columns(recipe: Recipe) -> set[str]:
 
 
 def _check_splits(seen: _Seen) -> Iterator[IntegrityFinding]:
-    """Every split of the file: a side for every record, and machines apart where it says so."""
+    """Every split must have a side for every record, and separate machines if it claims to."""
     try:
         for name, about in seen.data.splits.items():
             train, test = seen.data.split(name)
@@ -494,7 +494,7 @@ def _check_clipped(seen: _Seen) -> Iterator[IntegrityFinding]:
 
 
 def _check_plausible(seen: _Seen) -> Iterator[IntegrityFinding]:
-    """Records that are whole, and hardly meant; one that never changes has a note of its own."""
+    """Records that are complete but implausible; a constant one has its own note."""
     for check, found in seen.signals.doubts.items():
         if check != "still":
             records, texts = zip(*found, strict=True)
@@ -517,17 +517,17 @@ _CHECKS: tuple[Callable[[_Seen], Iterator[IntegrityFinding]], ...] = (
     _check_clipped,
     _check_plausible,
 )
-"""Every check; a new one is one function and one row."""
+"""All checks; a new one is one function and one row."""
 
 
-# --- words --------------------------------------------------------------------------------------
+# --- text ---------------------------------------------------------------------------------------
 
 _SHOWN = 5  # records of a finding in a line
-_MOST_RECORDS = 1000  # of a finding in JSON
+_MOST_RECORDS = 1000  # records of a finding in JSON
 
 
 def checked_table(checked: Checked) -> dict[str, Any]:
-    """What was found, ready for JSON.
+    """Result of a check, ready for JSON.
 
     Returns
     -------
@@ -555,12 +555,12 @@ def checked_table(checked: Checked) -> dict[str, Any]:
 
 
 def checked_text(table: Mapping[str, Any]) -> str:
-    """What was found, for people: the verdict, then a line for every finding.
+    """Result of a check as text: the verdict, then a line for every finding.
 
     Parameters
     ----------
     table : mapping
-        From :func:`checked_table`.
+        Table from :func:`checked_table`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where the label can be read without physics: one column, the order, a name, a condition."""
+"""Labels that can be read without physics: from one column, the order, a name, a condition."""
 
 import re
 from collections.abc import Iterator
@@ -12,14 +12,14 @@ from .table import BY_CHANCE, FEWEST, SHOWN, AuditTable, Finding, Float, named
 Bool = NDArray[np.bool_]
 
 READABLE = 0.95
-"""Share of the rows beyond the commonest class that one column alone must get right to be named."""
+"""Share of the rows beyond the commonest class that a column must get right to be reported."""
 
 _BLOCK = 64  # columns sorted at a time: 50 MB for 100,000 rows
-_PERIODS = 64  # longest cycle of labels in the order of rows that is looked for
+_PERIODS = 64  # longest cycle of labels in the row order that is searched
 
 
 def readable(table: AuditTable) -> Iterator[Finding]:
-    """One column, the order of rows or a word in a name that is as good as the label."""
+    """Single columns, the row order or words in names that predict the label."""
     if table.label is None or len(np.unique(table.label)) < 2:
         return
     columns = _skilled_columns(table)
@@ -44,7 +44,7 @@ def readable(table: AuditTable) -> Iterator[Finding]:
 
 
 def _skilled_columns(table: AuditTable) -> dict[str, float]:
-    """Accuracy of each column that reads the label, the best first."""
+    """Accuracy of each column that predicts the label, the best first."""
     assert table.label is not None
     values, names = table.values, list(table.names)
     gaps = ~np.isfinite(values)
@@ -67,7 +67,7 @@ def _skill(accuracy: Any, label: NDArray[np.intp]) -> Any:
 def neighbour_accuracy(
     values: Float, label: NDArray[np.intp], groups: NDArray[Any] | None = None
 ) -> Float:
-    """How often the row with the nearest value in one column has the same label.
+    """Share of rows whose label equals that of the row with the nearest value in one column.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ def neighbour_accuracy(
     label : numpy.ndarray [shape=(n_rows,)]
         Class of each row.
     groups : numpy.ndarray [shape=(n_rows,)], optional
-        Machine of each row: then the nearest row of another machine counts.
+        Machine of each row: if given, the nearest row of another machine counts.
 
     Returns
     -------
     numpy.ndarray [shape=(n_columns,)]
-        Share of the rows.
+        Share of the rows, for each column.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def _readable_order(table: AuditTable) -> Iterator[Finding]:
 
 
 def _cycles(label: NDArray[np.intp]) -> Iterator[tuple[float, int]]:
-    """Accuracy of naming the commonest class of each place in a cycle, for every length."""
+    """Accuracy of naming the commonest class of each position in a cycle, for every length."""
     for period in range(2, min(_PERIODS, label.size // 20) + 1):
         table = np.zeros((period, label.max() + 1))
         np.add.at(table, (np.arange(label.size) % period, label), 1)
@@ -156,7 +156,7 @@ def _cycles(label: NDArray[np.intp]) -> Iterator[tuple[float, int]]:
 
 
 def _readable_text(table: AuditTable) -> Iterator[Finding]:
-    """Words of file names and identifiers that tell the class."""
+    """Words of file names and identifiers that predict the class."""
     assert table.label is not None
     for name, texts in table.texts.items():
         words = [re.findall(r"[0-9]+|[^\W\d_]+", text) for text in texts.tolist()]
@@ -201,7 +201,7 @@ def _word_accuracy(
 
 
 def confounded(table: AuditTable) -> Iterator[Finding]:
-    """Nuisance whose rank correlation with the label is beyond chance."""
+    """Nuisance columns whose rank correlation with the label is beyond chance."""
     if table.label is None or len(np.unique(table.label)) < 2:
         return
     found: dict[str, tuple[float, float]] = {}
@@ -224,8 +224,8 @@ def confounded(table: AuditTable) -> Iterator[Finding]:
             what=f"{', '.join(found)} {'follows' if len(found) == 1 else 'follow'} "
             f"{table.label_name} beyond chance (rank correlation up to {found[worst][0]:.2f}, "
             f"{worst})",
-            means="a model can learn the condition in place of the wear, and fail where the two "
-            "part company",
+            means="a model can learn the condition instead of the wear, and fail if the two are no "
+            "longer related",
             cure="draw or record the conditions independently of the wear; or judge within narrow "
             "ranges of them",
         )
@@ -238,7 +238,7 @@ def _association(table: AuditTable, values: Float) -> tuple[float, float]:
     assert table.label is not None
     label = table.label.astype(float) if table.graded is None else table.graded
     if table.groups is not None and _one_per_machine(table.groups, values, label):
-        # records of one machine are no independent witnesses
+        # records of one machine are not independent
         _, machine = np.unique(table.groups, return_inverse=True)
         count = np.bincount(machine)
         values = np.bincount(machine, values) / count
@@ -255,19 +255,19 @@ def _association(table: AuditTable, values: Float) -> tuple[float, float]:
 
 
 def _one_per_machine(groups: NDArray[Any], values: Float, label: Float) -> bool:
-    """True where condition or label is the same in all records of a machine."""
+    """Whether condition or label is the same in all records of a machine."""
     _, machine = np.unique(groups, return_inverse=True)
     first = np.unique(machine, return_index=True)[1]
     return any(np.array_equal(v[first][machine], v) for v in (values, label))
 
 
 def lone_machines(table: AuditTable) -> Iterator[Finding]:
-    """Classes that one or two machines stand for, where a machine has one class only."""
+    """Classes represented by one or two machines, if each machine has one class only."""
     if table.label is None or table.groups is None:
         return
     pairs = np.unique(np.c_[np.unique(table.groups, return_inverse=True)[1], table.label], axis=0)
     if len(pairs) > np.unique(table.groups).size:
-        return  # machines change class: they can be told apart from it
+        return  # machines change class, so that both effects can be separated
     machines = np.bincount(pairs[:, 1], minlength=len(table.classes))
     few = [k for k in range(len(table.classes)) if 0 < machines[k] < FEWEST]
     if few:

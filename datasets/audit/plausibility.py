@@ -1,4 +1,4 @@
-"""What of a record is hardly meant: the checks of :mod:`.plausibility`, for files."""
+"""Implausible properties of records: the checks of :mod:`.plausibility`, for files."""
 
 import json
 import math
@@ -20,7 +20,7 @@ from ..recipe.load import recorded_scene
 
 
 def scene_in(head: Attributes) -> Scene | None:
-    """Scene of a file, before anything was drawn; None where it holds none.
+    """Scene of a file before any draws; None if it holds none.
 
     Examples
     --------
@@ -32,28 +32,28 @@ def scene_in(head: Attributes) -> Scene | None:
     if not head.scene:
         return None
     try:
-        if head.scene.startswith("{"):  # one recording, its scene as it was run
+        if head.scene.startswith("{"):  # one recording, with its scene as it was run
             return scene_from_table(json.loads(head.scene))
         return recorded_scene(head.scene, head.recipe, head.overrides)
-    except ValueError:  # of another version; the check of the recipe tells
+    except ValueError:  # of another version; reported by the check of the recipe
         return None
 
 
 def doubts_of(
     signal: Signal, head: Attributes | Recording, scene: Scene | None, speed_hz: float
 ) -> tuple[Doubt, ...]:
-    """What of one record is hardly meant.
+    """Implausible properties of one record.
 
     Parameters
     ----------
     signal : numpy.ndarray [shape=(n_channels, n_samples)]
-        Finite.
+        Signal, finite.
     head : Attributes or Recording
-        Names its rate, channels and tacho.
+        Source of rate, channels and tacho.
     scene : Scene or None
-        Whose sensors it was recorded with.
+        Scene whose sensors recorded the signal.
     speed_hz : float
-        Of the shaft by the manifest; NaN where unknown, then it is counted by the tacho.
+        Shaft speed by the manifest; NaN if unknown, then it is determined from the tacho.
 
     Returns
     -------
@@ -81,12 +81,12 @@ def _tacho_row(head: Attributes | Recording) -> int:
 
 
 def _counted_turns(signal: Signal, head: Attributes | Recording) -> float:
-    """Revolutions by the tacho; NaN without one, or where it has too few pulses to say."""
+    """Revolutions by the tacho; NaN without one, or if it has too few pulses."""
     if head.tacho is None:
         return math.nan
     try:
         pulses = pulse_times(signal[_tacho_row(head)], head.sample_rate)
-    except ValueError:  # no swing: told elsewhere
+    except ValueError:  # no swing: reported elsewhere
         return math.nan
     speed = (len(pulses) - 1) / head.pulses_per_revolution / float(pulses[-1] - pulses[0])
     return float(speed * signal.shape[1] / head.sample_rate)
@@ -95,15 +95,16 @@ def _counted_turns(signal: Signal, head: Attributes | Recording) -> float:
 def recording_doubts(
     recording: Recording, scene: Scene | None = None, *, scene_too: bool = False
 ) -> tuple[Doubt, ...]:
-    """What of a recording is hardly meant.
+    """Implausible properties of a recording.
 
     Parameters
     ----------
     recording : Recording
     scene : Scene, optional
-        Whose sensors it was recorded with.
+        Scene whose sensors recorded the signal.
     scene_too : bool
-        The scene is the one that was run, nothing drawn: doubts about it are of the recording too.
+        Whether the scene was run without further draws: doubts about it then apply to the
+        recording.
 
     Returns
     -------

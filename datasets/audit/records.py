@@ -1,4 +1,4 @@
-"""Signals that are there twice: copies, overlapping windows, copies with a little noise."""
+"""Duplicate signals: copies, overlapping windows, copies with a little noise."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,23 +15,23 @@ from .table import Float, usable_records
 Hashes = NDArray[np.uint64]
 
 ANCHORS = 128
-"""Places of a record that are remembered. A tenth of a record holds 13 of them on average; a copy
-is missed where fewer than `AGREEING` are in what two records share."""
+"""Number of remembered positions in a record. A tenth of a record holds 13 of them on average; a
+copy is missed if two records share fewer than `AGREEING`."""
 
 AGREEING = 3
-"""Anchors that must be equal at one shift before two records are compared sample by sample."""
+"""Anchors that must agree at one shift before two records are compared sample by sample."""
 
 LEFT_OVER = 3e-3
-"""Share of the energy that two signals may differ by and still be called copies: -25 dB."""
+"""Largest share of the energy by which a copy may differ: -25 dB."""
 
-_WINDOW = 64  # samples of which the ups and downs are one number
-_LEAST_TURNS = 12  # of these, else the pattern is too plain to tell a place
-_COMMON = 50  # records that a pattern is in before it is called a habit of the machine
-_BUCKETS = 256  # numbers of a sketch; correlations to 1 / sqrt(256) of themselves
-_CLOSE = 4.0  # times the energy left over: what the sketch's own error needs
-_CANDIDATES = 5_000  # pairs compared sample by sample, at most
-_FEWEST_SHARED = 256  # samples, four windows: less is an accident
-_BATCH = 16  # records a worker reads at a time
+_WINDOW = 64  # samples whose rises and falls form one number
+_LEAST_TURNS = 12  # of these, or else the pattern is too simple to mark a position
+_COMMON = 50  # records with a pattern before it is attributed to the machine
+_BUCKETS = 256  # numbers of a sketch; correlations are good to 1 / sqrt(256)
+_CLOSE = 4.0  # times the energy left over, to allow for the sketch's own error
+_CANDIDATES = 5_000  # largest number of pairs compared sample by sample
+_FEWEST_SHARED = 256  # samples, four windows: less is a coincidence
+_BATCH = 16  # records that a worker reads at a time
 _BLOCK = 1024  # sketches compared at a time
 
 MEASURES: dict[str, Callable[[Float], Float]] = {
@@ -40,25 +40,25 @@ MEASURES: dict[str, Callable[[Float], Float]] = {
     "smallest": lambda x: x.min(axis=1),
     "largest": lambda x: x.max(axis=1),
 }
-"""Plain numbers of every channel, audited like the columns of a table."""
+"""Statistics of every channel, audited like the columns of a table."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sketches:
-    """What is kept of each usable record of a data set.
+    """Data kept of each usable record of a data set.
 
     Attributes
     ----------
     records : numpy.ndarray [shape=(n,)]
         Record numbers.
     hashes, places : numpy.ndarray [shape=(n, ANCHORS)]
-        Pattern of the first channel, and the sample where it begins; place -1 where there are no
+        Pattern of the first channel, and the sample at which it begins; place -1 if there are no
         more.
     outline : numpy.ndarray [shape=(n, 256)]
         Random projection of the differences of the first channel, of unit energy on average; zero
-        where the signal is constant.
+        for a constant signal.
     names : tuple of str
-        Of the columns of `measures`.
+        Names of the columns of `measures`.
     measures : numpy.ndarray [shape=(n, n_measures)]
         `MEASURES` of every channel but the tacho.
     """
@@ -82,9 +82,9 @@ class Copy:
     shift : int
         Sample of the first at which the second begins; may be negative.
     share : float
-        Of the shorter record's samples.
+        Share of the shorter record's samples.
     exact : bool
-        True where the samples are equal; else equal but for gain, offset and a little noise.
+        True if the samples are equal; otherwise equal except for gain, offset and a little noise.
     """
 
     first: tuple[int, int]
@@ -97,12 +97,12 @@ class Copy:
 def sketch(
     data: DataSet, *, jobs: int = 1, progress: Callable[[int, int], None] | None = None
 ) -> Sketches:
-    """Read every usable record once and keep what copies are found by.
+    """Read every usable record once and keep the data needed to find copies.
 
     Parameters
     ----------
     data : DataSet
-        Any size; a batch of records is in memory at a time.
+        Data set of any size; a batch of records is in memory at a time.
     jobs : int
         Worker processes; the result does not depend on it.
     progress : callable, optional
@@ -111,12 +111,12 @@ def sketch(
     Returns
     -------
     Sketches
-        6 kB a record.
+        Sketches, 6 kB per record.
 
     Raises
     ------
     DataError
-        A record is damaged.
+        If a record is damaged.
     """
     usable = usable_records(data)
     batches = [usable[i : i + _BATCH] for i in range(0, usable.size, _BATCH)]
@@ -152,14 +152,14 @@ def _batch(
 
 
 def _first(recording: Recording) -> NDArray[np.float32]:
-    """The first channel that is no tacho: who cuts or copies a recording does so in all."""
+    """The first channel but the tacho: a recording is cut or copied in all channels alike."""
     signal = recording.vibration if recording.vibration_names else recording.signal
     found: NDArray[np.float32] = signal[0]
     return found
 
 
 def anchors(x: NDArray[np.float32]) -> tuple[Hashes, NDArray[np.int64]]:
-    """Places that a copy of a signal has too, whatever its gain, offset and where it was cut.
+    """Positions that a copy of a signal shares, whatever its gain, offset and cut.
 
     Parameters
     ----------
@@ -168,15 +168,15 @@ def anchors(x: NDArray[np.float32]) -> tuple[Hashes, NDArray[np.int64]]:
     Returns
     -------
     hashes : numpy.ndarray [shape=(ANCHORS,)]
-        Which of 63 differences of neighbours are rises, mixed; the smallest of the record.
+        Mixed bits of which of 63 differences of neighbours are rises; the smallest of the record.
     places : numpy.ndarray [shape=(ANCHORS,)]
         Sample at which each pattern begins; -1 for none.
 
     Notes
     -----
-    The smallest of hashes are a sample of all patterns that another record with the same patterns
-    takes too, because the order of the hashes is that of the patterns and not of their places.
-    Patterns that come twice in the record are left out: they tell no place.
+    The smallest hashes are a sample of all patterns that another record with the same patterns
+    selects too, because the order of the hashes depends on the patterns and not on their positions.
+    Patterns that occur twice in the record are left out, since they do not mark a position.
 
     References
     ----------
@@ -197,7 +197,7 @@ def anchors(x: NDArray[np.float32]) -> tuple[Hashes, NDArray[np.int64]]:
     turns = np.bitwise_count(pattern ^ (pattern >> np.uint64(1)))
     telling = np.flatnonzero((turns >= _LEAST_TURNS) & (turns <= _WINDOW - _LEAST_TURNS // 2))
     mixed = _mixed(pattern[telling])
-    # twice as many as are kept, so that those that come twice can be left out
+    # twice as many as are kept, so that those that occur twice can be left out
     lowest = np.argsort(mixed)[: 4 * ANCHORS] if mixed.size < 8 * ANCHORS else _lowest(mixed)
     unique, first, count = np.unique(mixed[lowest], return_index=True, return_counts=True)
     kept = np.flatnonzero(count == 1)[:ANCHORS]
@@ -211,7 +211,7 @@ def _lowest(mixed: Hashes) -> NDArray[np.intp]:
 
 
 def _ups(x: NDArray[np.float32]) -> Hashes:
-    """Bit k of element i is set where sample i + k + 1 is above sample i + k."""
+    """Bit k of element i is set if sample i + k + 1 is above sample i + k."""
     found = (x[1:] > x[:-1]).astype(np.uint64)
     width = 1
     while width < _WINDOW and found.size > width:
@@ -231,7 +231,7 @@ def _mixed(pattern: Hashes) -> Hashes:
 
 
 def outline(x: NDArray[np.float32]) -> Float:
-    """Short random projection of a signal's differences, which keeps correlations.
+    """Short random projection of a signal's differences, which preserves correlations.
 
     Parameters
     ----------
@@ -240,11 +240,12 @@ def outline(x: NDArray[np.float32]) -> Float:
     Returns
     -------
     numpy.ndarray [shape=(256,)]
-        Scaled to unit energy of the differences; zero for a constant signal.
+        Projection, scaled to unit energy of the differences; zero for a constant signal.
 
     Notes
     -----
-    Differences, because slow parts such as shaft orders of two recordings correlate by nature.
+    Differences are used because slow components of two recordings, such as shaft orders, are
+    naturally correlated.
 
     References
     ----------
@@ -269,25 +270,26 @@ def outline(x: NDArray[np.float32]) -> Float:
 
 @lru_cache(maxsize=1)
 def _signs(n: int) -> NDArray[np.int8]:
-    """The same random signs for every record of a length."""
+    """The same random signs for all records of a length."""
     found: NDArray[np.int8] = np.random.default_rng(0).integers(0, 2, n, dtype=np.int8) * 2 - 1
     return found
 
 
 def copies(sets: Sequence[DataSet], kept: Sequence[Sketches]) -> list[Copy]:
-    """Every pair of records that share samples, within and between data sets.
+    """All pairs of records that share samples, within and between data sets.
 
     Parameters
     ----------
     sets : sequence of DataSet
-        Read again where a pair is to be compared.
+        Data sets, read again if a pair is to be compared.
     kept : sequence of Sketches
-        Of each set.
+        Sketches of each set.
 
     Returns
     -------
     list of Copy
-        Rising, each compared sample by sample. Of n equal records, the first with each other one.
+        Pairs in rising order, each compared sample by sample; for n equal records, the first with
+        each other one.
     """
     owner = [(k, int(record)) for k, part in enumerate(kept) for record in part.records]
     sums = [int(sets[k].manifest["signal_crc32"].iloc[record]) for k, record in owner]
@@ -297,7 +299,7 @@ def copies(sets: Sequence[DataSet], kept: Sequence[Sketches]) -> list[Copy]:
         for number, value in enumerate(sums)
         if first_of.setdefault(value, number) != number
     ]
-    # of equal records one is enough to look for others
+    # of equal records, one is enough to search for others
     single = np.array(sorted(first_of.values()), dtype=np.intp)
     wanted: dict[tuple[int, int], int] = dict.fromkeys(equal, 0)
     for i, j, shift in [*_shifted(kept, single), *_level(kept, single)]:
@@ -333,7 +335,7 @@ def _shifted(kept: Sequence[Sketches], single: NDArray[np.intp]) -> list[tuple[i
 
 
 def _level(kept: Sequence[Sketches], single: NDArray[np.intp]) -> list[tuple[int, int, int]]:
-    """Pairs of records whose outlines are as good as equal or opposite, without a shift."""
+    """Pairs of records whose outlines are nearly equal or opposite, without a shift."""
     lines = np.concatenate([part.outline for part in kept])[single]
     lines = lines / np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-300)
     found = []
@@ -351,7 +353,7 @@ def _level(kept: Sequence[Sketches], single: NDArray[np.intp]) -> list[tuple[int
 def _compared(
     sets: Sequence[DataSet], one: tuple[int, int], two: tuple[int, int], shift: int
 ) -> Copy | None:
-    """The pair sample by sample where they overlap; None where they are not the same there."""
+    """The pair compared sample by sample where they overlap; None if they differ there."""
     x, y = (_first(sets[k][record]) for k, record in (one, two))
     part_x, part_y = overlap(x, y, shift)
     if part_x.size < _FEWEST_SHARED:
@@ -366,7 +368,7 @@ def _compared(
 def overlap(
     x: NDArray[np.float32], y: NDArray[np.float32], shift: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Parts of two signals that fall together when the second begins at a sample of the first.
+    """Parts of two signals that overlap if the second begins at a sample of the first.
 
     Examples
     --------
@@ -389,21 +391,21 @@ def _left_over(x: Float, y: Float) -> float:
 def pairs_in(
     found: Sequence[Copy], number: int, kept: Sketches
 ) -> tuple[list[Copy], NDArray[np.intp]]:
-    """Copies within one data set, and the rows of its table that they are.
+    """Copies within one data set, and their rows in its table.
 
     Parameters
     ----------
     found : sequence of Copy
-        Of all sets.
+        Copies of all sets.
     number : int
-        Of the set.
+        Number of the set.
     kept : Sketches
-        Of the set.
+        Sketches of the set.
 
     Returns
     -------
     mine : list of Copy
-        Of this set alone.
+        Copies within this set.
     rows : numpy.ndarray [shape=(n_copies, 2)]
         Rows among the usable records.
     """

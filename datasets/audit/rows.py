@@ -1,4 +1,4 @@
-"""Rows that are there twice, and machines on both sides of a split."""
+"""Duplicate rows, and machines on both sides of a split."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
@@ -13,7 +13,7 @@ Pairs = NDArray[np.intp]
 
 
 def row_copies(table: AuditTable) -> Iterator[Finding]:
-    """Rows that are there twice, or nearly so."""
+    """Rows that occur twice, exactly or nearly."""
     pairs = copied_rows(table.values)
     if len(pairs) == 0:
         return
@@ -44,17 +44,17 @@ def row_copies(table: AuditTable) -> Iterator[Finding]:
 
 
 def copied_rows(values: Float) -> Pairs:
-    """Pairs of rows that agree in every measured column, to what chance cannot bring about.
+    """Pairs of rows that agree in every measured column, beyond chance.
 
     Parameters
     ----------
     values : numpy.ndarray [shape=(n_rows, n_columns)]
-        Columns with a gap or with few values are not looked at.
+        Columns; those with a gap or with few values are ignored.
 
     Returns
     -------
     numpy.ndarray [shape=(n_pairs, 2)]
-        Row numbers; of n equal rows, the first with each other one.
+        Row numbers; for n equal rows, the first with each other one.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def copied_rows(values: Float) -> Pairs:
 
 
 def _first_of_equal(values: Float) -> tuple[NDArray[np.intp], Pairs]:
-    """First of each set of equal rows, and every other one with it."""
+    """First of each set of equal rows, paired with every other one of the set."""
     if values.shape[1] == 0:
         return np.arange(len(values)), np.empty((0, 2), dtype=np.intp)
     _, first, inverse = np.unique(values, axis=0, return_index=True, return_inverse=True)
@@ -93,17 +93,17 @@ def _first_of_equal(values: Float) -> tuple[NDArray[np.intp], Pairs]:
 
 
 def _rank(scaled: Float) -> int:
-    """About how many independent columns there are, from at most 64 of them."""
+    """Approximate number of independent columns, from at most 64 of them."""
     probe = scaled[:, :: max(1, scaled.shape[1] // 64)]
     try:
         weights = np.linalg.svd(probe, compute_uv=False) ** 2
-    except np.linalg.LinAlgError:  # the iteration of LAPACK may fail; the symmetric one does not
+    except np.linalg.LinAlgError:  # LAPACK's iteration may fail; the symmetric one does not
         weights = np.clip(np.linalg.eigvalsh(probe.T @ probe), 0.0, None)
     return max(1, int(weights.sum() ** 2 / (weights**2).sum()))
 
 
 def crossing(sides: Mapping[str, NDArray[np.int8]], pairs: Pairs) -> dict[str, int]:
-    """How many pairs of rows have one on either side, by split; splits without any are left out.
+    """Number of pairs of rows on different sides, by split; splits without any are left out.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ def shared_machines(table: AuditTable) -> Iterator[Finding]:
             + (", by design" if meant else ""),
             means="figures hold for machines that were trained on, not for new ones"
             if meant
-            else "the test asks about machines that training has seen: figures are too good",
-            cure="say so beside every figure" if meant else "split by machine",
+            else "machines in the test were seen in training: the figures are too good",
+            cure="state it with every figure" if meant else "split by machine",
         )
 
 
@@ -150,12 +150,12 @@ def cross_copies(tables: Sequence[AuditTable]) -> Iterator[tuple[int, int, Pairs
     Parameters
     ----------
     tables : sequence of AuditTable
-        Any.
+        Tables to compare.
 
     Yields
     ------
     first, second : int
-        Numbers of the tables.
+        Indices of the tables.
     pairs : numpy.ndarray [shape=(n_pairs, 2)]
         Row in the first and row in the second.
     """

@@ -1,4 +1,4 @@
-"""What an audit looks at: a table of numbers with its labels, machines and splits."""
+"""Input of an audit: a table of numbers with its labels, machines and splits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,55 +17,56 @@ Float = NDArray[np.float64]
 Severity = Literal["alarm", "warning", "note"]
 
 BY_CHANCE = 1e-3
-"""Probability that chance raises any one finding of a check (Bonferroni over its columns)."""
+"""Probability that chance causes a false finding of a check (Bonferroni over its columns)."""
 
 FEWEST = 3
-"""Rows that a class must have to be looked at, and machines that it needs."""
+"""Fewest rows that a class needs to be checked, and fewest machines that it needs."""
 
 FEW_DISTINCT = 0.5
-"""Of the rows: a column with fewer values is counted, not measured."""
+"""Share of distinct values, relative to rows, below which a column holds counts, not
+measurements."""
 
 SMALLEST, LARGEST = 1e-100, 1e100
-"""Sizes of numbers that are compared, beside 0: their squares, products and ratios are finite."""
+"""Range of magnitudes compared, in addition to 0: squares, products and ratios are finite."""
 
 SHOWN = 10
-"""Columns, rows and records that a finding names."""
+"""Columns, rows and records listed in a finding."""
 
 OWN = ("record_id", "group", "grade", "signal_crc32")
-"""Columns that tell a table of `wearstate features`; its features alone have a dot in the name."""
+"""Columns that identify a table of `wearstate features`; its features have a dot in the name."""
 
 LARGEST_TABLE = 2**32
-"""Largest believable table file [byte]."""
+"""Largest plausible table file [byte]."""
 
 MOST_CLASSES = 20
 """A numeric label with more values is continuous, and cut into `BINS`."""
 
 BINS = 4
-"""Classes of equal size that a continuous label is cut into."""
+"""Classes of equal size into which a continuous label is cut."""
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet")
-"""Suffixes of plain tables; HDF5 is looked into."""
+"""Suffixes of plain tables; the content of HDF5 files decides."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One thing that an audit found.
+    """One finding of an audit.
 
     Attributes
     ----------
     code : str
         Kind of finding, for programs.
     severity : {"alarm", "warning", "note"}
-        Alarm: figures from these data can be worthless. Warning: they may be; look. Note: known
-        and harmless if heeded.
+        Alarm: figures from these data can be worthless. Warning: they may be; check. Note: known
+        and harmless if considered.
     where : str
-        File it is in.
+        File concerned.
     columns : tuple of str
         Columns concerned, the first few.
     numbers : mapping
-        Counts and values behind it.
+        Counts and values behind the finding.
     what, means, cure : str
-        What was found, what it means, what to do.
+        Finding, its meaning, and what to do.
     """
 
     code: str
@@ -79,7 +80,7 @@ class Finding:
 
 
 def named(names: Sequence[str]) -> str:
-    """The first few columns, and how many more.
+    """The first few columns, and the number of others.
 
     Examples
     --------
@@ -91,43 +92,43 @@ def named(names: Sequence[str]) -> str:
 
 
 def has(names: Sequence[Any]) -> str:
-    """``has`` of one, ``have`` of several."""
+    """``has`` for one, ``have`` for several."""
     return "has" if len(names) == 1 else "have"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AuditTable:
-    """Rows of numbers, with what is known of them.
+    """Rows of numbers, with their labels, machines and splits.
 
     Attributes
     ----------
     source : str
         File name, for messages.
     names : tuple of str
-        Of the columns of `values`.
+        Names of the columns of `values`.
     values : numpy.ndarray [shape=(n_rows, n_columns)]
-        What a model would be given; may hold NaN.
+        Inputs of a model; may hold NaN.
     texts : mapping of str to numpy.ndarray [shape=(n_rows,)]
         Columns of text.
     label_name : str
-        Empty without a label.
+        Name of the label; empty without one.
     label : numpy.ndarray [shape=(n_rows,)] or None
         Class of each row, counted from 0.
     classes : tuple of str
         Name of each class.
     graded : numpy.ndarray [shape=(n_rows,)] or None
-        The label as a number where its order means something: wear in metres.
+        The label as a number if it is ordered: wear in metres.
     groups : numpy.ndarray [shape=(n_rows,)] or None
         Machine of each row.
     nuisance : mapping of str to numpy.ndarray [shape=(n_rows,)]
-        Conditions and other faults, which should not follow the label.
+        Conditions and other faults, which should not be related to the label.
     sides : mapping of str to numpy.ndarray [shape=(n_rows,)]
         Splits: 0 train, 1 test, -1 neither.
     shared : frozenset of str
         Splits that have machines on both sides by design.
     numbered : bool
-        True where machines are numbered within their data set, and other files use the same
-        numbers for other machines.
+        True if machines are numbered within their data set, and other files use the same numbers
+        for other machines.
     """
 
     source: str
@@ -147,7 +148,7 @@ class AuditTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Roles:
-    """Which columns of a table are what; by name, or by number counted from 1.
+    """Roles of the columns of a table; by name, or by number counted from 1.
 
     Attributes
     ----------
@@ -156,9 +157,10 @@ class Roles:
     group : str
         Column of the machine.
     split : str
-        Column that says ``train`` or ``test``, or 0, 1 and -1; of a data set the stored name.
+        Column with ``train`` or ``test``, or 0, 1 and -1; for a data set the name of a stored
+        split.
     nuisance : tuple of str
-        Columns that should not follow the label.
+        Columns that should not be related to the label.
     """
 
     label: str = ""
@@ -168,11 +170,11 @@ class Roles:
 
 
 NO_ROLES = Roles()
-"""Nothing is said: only what the file says of itself."""
+"""No roles given: only those declared by the file."""
 
 
 def is_data_set(path: Path) -> bool:
-    """True for an HDF5 file that this program wrote as a data set."""
+    """Whether a file is HDF5 written by this program as a data set."""
     if path.suffix not in (".h5", ".hdf5", ".part"):
         return False
     import h5py
@@ -181,7 +183,7 @@ def is_data_set(path: Path) -> bool:
         with h5py.File(path) as file:
             return "signal" in file and "manifest" in file
     except HDF5_FAULTS:
-        return True  # let the reader of data sets say what is wrong with it
+        return True  # the reader of data sets reports its fault
 
 
 def read_table(path: str | Path, roles: Roles = NO_ROLES) -> AuditTable:
@@ -192,18 +194,18 @@ def read_table(path: str | Path, roles: Roles = NO_ROLES) -> AuditTable:
     path : str or Path
         File.
     roles : Roles
-        Which columns are label, machine, split and nuisance. A table that `wearstate features`
-        wrote needs none: it is judged by its columns ``grade`` and ``group``.
+        Roles of columns: label, machine, split and nuisance. A table written by `wearstate
+        features` needs none: its columns ``grade`` and ``group`` are used.
 
     Returns
     -------
     AuditTable
-        Columns without a role, numbers and text apart.
+        Columns without a role, with numbers and text separate.
 
     Raises
     ------
     DataError
-        The file cannot be read, is empty, or lacks a column that `roles` name; all at once.
+        If the file cannot be read, is empty, or lacks a column named in `roles`; all at once.
     """
     place = Path(path)
     frame = _frame(place)
@@ -241,7 +243,7 @@ def read_table(path: str | Path, roles: Roles = NO_ROLES) -> AuditTable:
 
 
 def comparable(values: Float) -> Float:
-    """Numbers with those of a size that no check can compute with made missing.
+    """Numbers, with those too large or too small for any check made missing.
 
     Parameters
     ----------
@@ -257,7 +259,7 @@ def comparable(values: Float) -> Float:
 
 
 def _machines(column: Any, place: Path) -> NDArray[np.str_]:
-    """Machine of each row; a row without one would be taken for a machine of its own."""
+    """Machine of each row; a row without one would count as a separate machine."""
     missing = np.flatnonzero(column.isna().to_numpy())
     if missing.size:
         raise DataError(
@@ -268,7 +270,7 @@ def _machines(column: Any, place: Path) -> NDArray[np.str_]:
 
 
 def _own_roles(frame: Any, roles: Roles) -> Roles:
-    """What a table of `wearstate features` says of itself, where nothing else was said."""
+    """Roles of a table written by `wearstate features`, unless others are given."""
     conditions = [name for name in frame.columns if is_nuisance(str(name))]
     return Roles(
         label=roles.label or "grade",
@@ -279,7 +281,7 @@ def _own_roles(frame: Any, roles: Roles) -> Roles:
 
 
 def is_nuisance(column: str) -> bool:
-    """True of a manifest column that is drawn beside the wear: a condition, another fault."""
+    """Whether a manifest column is drawn in addition to the wear: a condition, another fault."""
     from ...sim.scene.load import all_condition_places
 
     return column in all_condition_places() or column.startswith("confounder_")
@@ -288,7 +290,7 @@ def is_nuisance(column: str) -> bool:
 def _taken(
     frame: Any, roles: Roles, place: Path
 ) -> tuple[dict[str, str], tuple[str, ...], list[str]]:
-    """Column of each role that is one, columns of the nuisance, faults."""
+    """Column of each role that names one, nuisance columns, and faults."""
     single = {"label": roles.label, "group": roles.group, "split": roles.split}
     wanted = {role: name for role, name in single.items() if name}
     if roles.label and _is_file(roles.label, frame):
@@ -318,7 +320,7 @@ def _is_file(name: str, frame: Any) -> bool:
 
 
 def _label(frame: Any, column: str | None, wanted: str, place: Path) -> tuple[str, Any]:
-    """Label of every row, from a column or from a file of its own."""
+    """Label of every row, from a column or from a separate file."""
     if column is not None:
         return column, frame[column]
     if not wanted:
@@ -333,14 +335,14 @@ def _label(frame: Any, column: str | None, wanted: str, place: Path) -> tuple[st
 
 
 def coded(label: Any, name: str) -> tuple[tuple[str, ...], NDArray[np.intp] | None, Float | None]:
-    """Classes of a label, the class of every row, and its number where that is continuous.
+    """Classes of a label, the class of every row, and its number if it is continuous.
 
     Parameters
     ----------
     label : array_like [shape=(n_rows,)] or None
         Texts or numbers.
     name : str
-        For messages.
+        Name for messages.
 
     Returns
     -------
@@ -349,12 +351,12 @@ def coded(label: Any, name: str) -> tuple[tuple[str, ...], NDArray[np.intp] | No
     codes : numpy.ndarray [shape=(n_rows,)] or None
         Index into `classes`; None without a label.
     graded : numpy.ndarray [shape=(n_rows,)] or None
-        The numbers of a continuous label.
+        Numbers of a continuous label.
 
     Raises
     ------
     DataError
-        A label is missing.
+        If a label is missing.
 
     Examples
     --------
@@ -410,7 +412,7 @@ def _sides(column: Any, place: Path) -> NDArray[np.int8]:
 
 
 def _frame(path: Path) -> Any:
-    """Columns of a file as a data frame, named by number where it names none."""
+    """Columns of a file as a data frame, numbered if they have no names."""
     if not path.is_file():
         raise DataError(missing_file(path))
     if path.stat().st_size > LARGEST_TABLE:
@@ -437,11 +439,13 @@ def _frame(path: Path) -> Any:
         ) from None
     except (ValueError, OSError) as error:  # pandas' own errors are ValueErrors
         text = " ".join(str(error).split())
-        raise DataError(f"{path} cannot be read as a table ({text}); mend or convert it") from None
+        raise DataError(
+            f"{path} cannot be read as a table ({text}); repair or convert it"
+        ) from None
 
 
 def _csv_dialect(path: Path) -> dict[str, Any]:
-    """Separator, decimal sign and header of a text table, told by its first lines."""
+    """Separator, decimal mark and header of a text table, detected in its first lines."""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         lines = [file.readline(2**22) for _ in range(3)]
     first, probe = lines[0], lines[1] or lines[0]
@@ -465,7 +469,7 @@ def _is_number(cell: str, decimal: str) -> bool:
 
 
 def _hdf5_frame(path: Path) -> Any:
-    """One column per dataset, as `wearstate features -o table.h5` writes it."""
+    """One column per dataset, as written by `wearstate features -o table.h5`."""
     import h5py
     import pandas as pd
 
@@ -503,21 +507,21 @@ def manifest_table(data: DataSet, roles: Roles, names: Sequence[str], values: Fl
     data : DataSet
         Simulated or measured.
     roles : Roles
-        What replaces grade, machine and all stored splits.
+        Roles that replace grade, machine and all stored splits.
     names : sequence of str
-        Of the columns of `values`.
+        Names of the columns of `values`.
     values : numpy.ndarray [shape=(n_usable, n_columns)]
         One row per usable record.
 
     Returns
     -------
     AuditTable
-        With the conditions of the manifest as nuisance.
+        Table with the conditions of the manifest as nuisance.
 
     Raises
     ------
     DataError
-        A role names a column or split that is not there.
+        If a role names a missing column or split.
     """
     usable = usable_records(data)
     manifest = data.manifest.iloc[usable]
@@ -561,7 +565,7 @@ def usable_records(data: DataSet) -> NDArray[np.intp]:
 
 
 def _data_label(data: DataSet, manifest: Any, roles: Roles) -> tuple[str, Any, Float | None]:
-    """The grade with the severity behind it; nothing where it is not known."""
+    """The grade with the severity behind it; nothing if unknown."""
     if roles.label:
         return roles.label, manifest[roles.label], None
     if (manifest["grade"] < 0).any() or not data.attributes.severities:

@@ -1,4 +1,4 @@
-"""A data set in other programs' formats, and compressed; what they lack is said, not dropped."""
+"""A data set in other programs' formats, and compressed; what they cannot hold is reported."""
 
 import json
 import math
@@ -25,35 +25,35 @@ from ..measured.label_columns import GRADE, RESERVED
 from ..source.channel_units import known_unit
 
 ABOUT = "export.json"
-"""File of an exported folder that says what it is; only a folder with it is ever replaced."""
+"""File that describes an exported folder; only a folder with it is ever replaced."""
 
 LABELS = "labels.csv"
-"""File of an exported folder that ``import`` reads the labels from."""
+"""File of an exported folder from which ``import`` reads the labels."""
 
 GZIP_LEVEL = 1
-"""Of compressed copies. Higher levels gain 2 to 3 % and take up to six times as long."""
+"""Level of compressed copies. Higher levels gain 2 to 3 % and take up to six times as long."""
 
-_HIGHEST_RATE = 2**32 - 1  # Hz, of a WAV header
-_ROWS = 64  # records of a row group of Parquet that holds signals
-_MANY_ROWS = 2**16  # of one that holds labels only
+_HIGHEST_RATE = 2**32 - 1  # Hz, in a WAV header
+_ROWS = 64  # records in a row group of Parquet with signals
+_MANY_ROWS = 2**16  # in one with labels only
 
 
 @dataclass(frozen=True, kw_only=True)
 class Exported:
-    """What an export made.
+    """Result of an export.
 
     Attributes
     ----------
     path : Path
         File or folder.
     kind : str
-        A key of `FORMATS`.
+        Key of `FORMATS`.
     n_records, n_left_out : int
-        Records in it, and those left out because the format cannot say that they failed.
+        Records exported, and failed ones left out because the format cannot mark them.
     n_bytes : int
-        Of all its files.
+        Size of all its files.
     import_command : str
-        What brings it back; empty for a format that holds everything.
+        Command that imports the export; empty for a format that holds everything.
     """
 
     path: Path
@@ -81,17 +81,17 @@ def export_set(
     path : str or Path
         A finished data set file.
     output : str or Path
-        File, whose suffix tells the format, or folder.
+        File, whose suffix determines the format, or folder.
     kind : {"h5", "parquet", "npz", "wav", "csv"}, optional
-        Needed for a folder; by the suffix otherwise.
+        Required for a folder; otherwise by the suffix.
     signals : bool
-        Parquet: signals too, a column of lists for every channel.
+        Parquet: include signals, as a column of lists for every channel.
     compress : bool
-        HDF5 and npz: compressed without loss.
+        HDF5 and npz: lossless compression.
     force : bool
         Replace an existing file, or a folder that an export made.
     progress : callable, optional
-        Called with (records written, records in all).
+        Called with (records written, records in total).
 
     Returns
     -------
@@ -100,7 +100,7 @@ def export_set(
     Raises
     ------
     DataError
-        The file cannot be read or a signal is damaged, an option does not fit the format, the
+        If the file cannot be read or a signal is damaged, an option does not fit the format, the
         output exists, or Parquet is not installed. Nothing is left behind.
 
     Notes
@@ -114,8 +114,8 @@ def export_set(
     wav, csv  a file for every usable record, the labels, and the command that imports them
     ========  ==================================================================================
 
-    Memory holds the manifest and a record, of Parquet with signals 64 records. WAV and CSV leave
-    out records whose status is not ``ok``: their files could not say so.
+    Memory holds the manifest and one record, for Parquet with signals 64 records. WAV and CSV leave
+    out records whose status is not ``ok``, since their files cannot mark them.
 
     Examples
     --------
@@ -164,11 +164,11 @@ class _Format:
     ----------
     name : str
     suffixes : tuple of str
-        Of its files; of a folder, of the files in it.
+        Suffixes of the file; for a folder, of the files in it.
     folder : bool
-        A file for every usable record, rather than one for all.
+        Whether it has a file for every usable record instead of one for all.
     compressible, signals_optional : bool
-        Which options it has.
+        Supported options.
     write : callable
         ``write(job, path)``.
     """
@@ -182,7 +182,7 @@ class _Format:
 
 
 class _Job:
-    """One export: what, and how far it is."""
+    """One export and its progress."""
 
     def __init__(
         self,
@@ -205,7 +205,7 @@ class _Job:
         self.indices: list[int] = np.flatnonzero(ok | (not way.folder)).tolist()
 
     def records(self) -> Iterator[tuple[int, Recording]]:
-        """Every record to write, its checksum looked at."""
+        """Every record to write, with its checksum verified."""
         if not self.indices:
             raise DataError(f"{self.data.path}: 0 usable records, must be > 0; see status")
         for done, index in enumerate(self.indices, start=1):
@@ -214,12 +214,12 @@ class _Job:
                 self.progress(done, len(self.indices))
 
     def file_name(self, index: int) -> str:
-        """File of one record in a folder."""
+        """File name of one record in a folder."""
         return f"{index:08d}{self.way.suffixes[0]}"
 
     def import_command(self, folder: Path) -> str:
-        """What brings a folder back."""
-        files = f"{shlex.quote(str(folder))}/[0-9]*{self.way.suffixes[0]}"  # not the labels
+        """Command that imports a folder."""
+        files = f"{shlex.quote(str(folder))}/[0-9]*{self.way.suffixes[0]}"  # without the labels
         return " ".join(
             ["wearstate import", files, *map(shlex.quote, self._import_options(folder))]
         )
@@ -227,7 +227,7 @@ class _Job:
     def _import_options(self, folder: Path) -> Iterator[str]:
         head = self.head
         yield from ("--fs", repr(head.sample_rate))
-        if self.way.name == "wav":  # which names no channels
+        if self.way.name == "wav":  # which has no channel names
             yield from ("--channels", ",".join(channel.name for channel in head.channels))
         for channel in head.channels:
             if known_unit(channel.unit):
@@ -277,14 +277,14 @@ def _refuse_options(way: _Format, *, signals: bool, compress: bool) -> None:
 
 
 def _refuse_target(target: Path, source: Path, way: _Format, force: bool) -> None:
-    """Refuse to replace anything that `force` does not allow, and ever the input or a folder."""
+    """Refuse to replace anything beyond what `force` allows, and always the input or a folder."""
     if target.exists() and target.samefile(source):
         raise DataError(f"{target} is also the input, must be another file; choose another name")
     if not way.folder:
         refuse_output(target, force)
         return
     if not target.parent.is_dir():
-        raise DataError(f"{target.parent} is no folder; create it")
+        raise DataError(f"{target.parent} is not a folder; create it")
     if target.exists() and not target.is_dir():
         raise DataError(f"{target} is a file, must be a folder for {way.name}; choose another name")
     if not target.is_dir() or not any(target.iterdir()):
@@ -308,12 +308,12 @@ def _refuse_rate(job: _Job) -> None:
 
 
 def _write_whole(target: Path, job: _Job, force: bool) -> None:
-    """Write under another name, then rename: the output is whole or not there."""
+    """Write under another name, then rename: the output is complete or absent."""
     with replacing(target, force=force) as fresh:
         if job.way.folder:
             fresh.mkdir()
         job.way.write(job, fresh)
-        if force:  # what it allows to replace may have changed
+        if force:  # the replaceable output may have changed
             _refuse_target(target, job.data.path, job.way, force)
 
 
@@ -321,7 +321,7 @@ def _write_whole(target: Path, job: _Job, force: bool) -> None:
 
 
 def _write_hdf5(job: _Job, path: Path) -> None:
-    """A copy with the same values in every dataset; hashes are added where there were none."""
+    """A copy with the same values in every dataset; hashes are added if they were missing."""
     with h5py.File(job.data.path, "r") as old, h5py.File(path, "w") as new:
         write_values(new, stamped(job.data.stored, job.data.rows))
         new.create_dataset("manifest", data=job.data.rows)
@@ -339,7 +339,7 @@ def _write_hdf5(job: _Job, path: Path) -> None:
 
 
 def _copy_records(new: Any, name: str, source: Any, job: _Job, rows: Iterator[Any]) -> None:
-    small = source.ndim == 1  # one number a record: nothing to compress
+    small = source.ndim == 1  # one number per record: nothing to compress
     packed = {"compression": "gzip", "compression_opts": GZIP_LEVEL, "shuffle": True}
     target = new.create_dataset(
         name,
@@ -356,7 +356,7 @@ def _copy_records(new: Any, name: str, source: Any, job: _Job, rows: Iterator[An
 
 
 def _write_npz(job: _Job, path: Path) -> None:
-    """A zip of ``.npy`` files, the signals written one after the other."""
+    """A zip of ``.npy`` files, with the signals written one after the other."""
     way = zipfile.ZIP_DEFLATED if job.compress else zipfile.ZIP_STORED
     shape = job.data.stored_shape
     with zipfile.ZipFile(path, "w", way) as file, h5py.File(job.data.path, "r") as old:
@@ -394,7 +394,7 @@ def _add_array(
     pieces: Iterator[Any],
 ) -> None:
     head = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
-    # a member's time is that of now otherwise: the same export must give the same bytes
+    # a member's time would be the present: the same export must give the same bytes
     member = zipfile.ZipInfo(f"{name}.npy")
     member.compress_type = file.compression
     with file.open(member, "w", force_zip64=True) as handle:
@@ -404,7 +404,7 @@ def _add_array(
 
 
 def _attributes_json(job: _Job) -> str:
-    """The file's attributes, as plain JSON."""
+    """The file's attributes as plain JSON."""
     plain = {
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in sorted(job.data.stored.items())
@@ -418,7 +418,7 @@ def _attributes_json(job: _Job) -> str:
 
 
 def _write_parquet(job: _Job, path: Path) -> None:
-    """Columns of the manifest; with signals, row groups of as many records as memory is worth."""
+    """Columns of the manifest; with signals, row groups limited by memory."""
     try:
         import pyarrow as pa
         from pyarrow import parquet
@@ -490,7 +490,7 @@ def _write_csv(job: _Job, folder: Path) -> None:
 
 
 def _write_labels(job: _Job, folder: Path) -> None:
-    """Labels as ``import`` reads them, and what the folder is."""
+    """Labels in the form that ``import`` reads, and the description of the folder."""
     import pandas as pd
 
     rows = [job.data.row(index) for index in job.indices]
@@ -504,14 +504,14 @@ def _write_labels(job: _Job, folder: Path) -> None:
     safe_frame(pd.DataFrame(told)).to_csv(folder / LABELS, index=False)
     about = {
         "attributes": json.loads(_attributes_json(job)),
-        "import": job.import_command(Path(job.target.name)),  # beside it: same bytes anywhere
+        "import": job.import_command(Path(job.target.name)),  # same bytes anywhere
         "left_out": len(job.data) - len(job.indices),
     }
     (folder / ABOUT).write_text(json.dumps(about, indent=1), encoding="utf-8")
 
 
 def _cell(name: str, value: Any) -> str:
-    """A label as text; empty where it is not known."""
+    """A label as text; empty if unknown."""
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):
@@ -541,11 +541,11 @@ FORMATS: dict[str, _Format] = {
         _Format(name="csv", suffixes=(".csv",), folder=True, write=_write_csv),
     )
 }
-"""Every format; a new one is one function and one row."""
+"""All formats; a new one is one function and one row."""
 
 
 def exported_text(made: Exported) -> str:
-    """What an export made, for people.
+    """Summary of an export.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Several data sets of one kind into one: machines stay apart, every record tells its source."""
+"""Several data sets of one kind merged into one, with machines kept apart and sources recorded."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from ..measured.label_table import listed, refusal
 from ..measured.plan import RATE_TOLERANCE
 
 SOURCE, SOURCE_GROUP, SOURCE_ID = "source", "source_group", "source_record_id"
-"""Manifest columns: data set that a record is from, its group and its id there."""
+"""Manifest columns: data set of origin of a record, and its group and id there."""
 
 GROUP_NAME = "group_name"
 
@@ -41,7 +41,7 @@ _SAME = (
 
 @dataclass(frozen=True, kw_only=True)
 class MergeSummary:
-    """What a merge made.
+    """Result of a merge.
 
     Attributes
     ----------
@@ -50,13 +50,13 @@ class MergeSummary:
     n_records, n_groups : int
         Records, and machines.
     sources : dict
-        Records taken from each data set, by its name.
+        Number of records taken from each data set, by its name.
     n_dropped : int
-        Duplicates left out.
+        Number of duplicates left out.
     filled : dict
-        Columns that some data sets lack -> names of those; their values are NaN or empty.
+        Data sets that lack a column, by column; their values are NaN or empty.
     n_joined : int
-        Groups of different data sets that hold a same signal, and so became one.
+        Number of groups of different data sets that hold an identical signal and became one.
     """
 
     path: Path
@@ -94,12 +94,12 @@ def merge_sets(
     path : str or Path
         File to write; ``<path>.part`` until finished.
     duplicates : {"refuse", "drop"}
-        What to do with a record whose id and signal another data set holds as well; the first one
+        Treatment of a record whose id and signal another data set holds as well; the first one
         stays.
     force : bool
         Replace an existing file.
     progress : callable, optional
-        Called with (records done, records in all).
+        Called with (records done, records in total).
 
     Returns
     -------
@@ -108,14 +108,15 @@ def merge_sets(
     Raises
     ------
     DataError
-        A data set cannot be read or is given twice, they are not of one kind, or there are
-        duplicates; the output exists. Nothing is left behind.
+        If a data set cannot be read or is given twice, they are not of one kind, there are
+        duplicates, or the output exists. Nothing is left behind.
 
     Notes
     -----
-    Groups get new numbers: two data sets share one only where they hold a same signal, for then it
-    is the same machine. Record ids are kept where no two are equal, else numbered anew. Stored
-    splits and hidden quantities are left out: they belong to the sets they were made for.
+    Groups get new numbers: two data sets share one only if they hold an identical signal, which
+    shows that it is the same machine. Record ids are kept if they are unique, otherwise numbered
+    anew. Stored splits and hidden quantities are left out: they belong to the sets they were made
+    for.
 
     Examples
     --------
@@ -181,7 +182,7 @@ def _names(files: Sequence[Path]) -> list[str]:
 
 
 def _kind(data: DataSet) -> dict[str, Any]:
-    """What must be the same, by the keys of `_SAME`."""
+    """Properties that must be equal, by the keys of `_SAME`."""
     head = data.attributes
     return {
         "channels": [(c.name, c.unit, c.quantity) for c in head.channels],
@@ -194,12 +195,12 @@ def _kind(data: DataSet) -> dict[str, Any]:
 
 
 def _common(sets: Sequence[DataSet], names: Sequence[str]) -> Attributes:
-    """Attributes of the whole; every difference that forbids one is told."""
+    """Attributes of the merged set; all differences that prevent a merge are reported."""
     kinds = [_kind(data) for data in sets]
     faults = []
     for key, words in _SAME:
         values = [kind[key] for kind in kinds]
-        # where limits are not known, no grade contradicts those of the others
+        # unknown limits do not contradict grades by those of the others
         told = [value for value in values if key != "limits" or value]
         if not all(_alike(key, value, told[0]) for value in told):
             each = "; ".join(f"{v} in {n}" for v, n in zip(values, names, strict=True))
@@ -237,7 +238,7 @@ def _alike(key: str, one: Any, other: Any) -> bool:
 
 
 def _shared(heads: Sequence[Attributes], name: str) -> str:
-    """A text that all have, else none: it would not be true of every record."""
+    """A text that all have, or else none: it would not be true of every record."""
     texts = {str(getattr(head, name)) for head in heads}
     return texts.pop() if len(texts) == 1 else ""
 
@@ -259,13 +260,13 @@ def _provenance(sets: Sequence[DataSet], names: Sequence[str]) -> list[dict[str,
 
 
 _Pair = tuple[tuple[int, int], tuple[int, int]]
-"""Two groups, each as (source, number there), that hold a same signal."""
+"""Two groups, each as (source, number there), that hold an identical signal."""
 
 
 def _distinct(
     sets: Sequence[DataSet], names: Sequence[str], duplicates: Duplicates
 ) -> tuple[list[_Origin], list[_Pair], int]:
-    """Records to keep, groups that are one machine, and how many records were dropped."""
+    """Records to keep, groups that are one machine, and the number of dropped records."""
     seen: dict[int, list[_Origin]] = {}
     kept: list[_Origin] = []
     joined: list[_Pair] = []
@@ -303,7 +304,7 @@ def _group_of(sets: Sequence[DataSet], origin: _Origin) -> tuple[int, int]:
 
 
 def _groups(sets: Sequence[DataSet], joined: Sequence[_Pair]) -> dict[tuple[int, int], int]:
-    """New number of every group, equal only where groups are joined."""
+    """New number of every group, equal only for groups that are joined."""
     own = [(i, int(g)) for i, data in enumerate(sets) for g in np.unique(data.rows["group"])]
     leader = {group: group for group in own}
 
@@ -325,7 +326,7 @@ def _groups(sets: Sequence[DataSet], joined: Sequence[_Pair]) -> dict[tuple[int,
 def _columns(
     sets: Sequence[DataSet], names: Sequence[str]
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
-    """Types of the columns of all, and which sets lack which."""
+    """Types of the columns of all sets, and the sets that lack each."""
     types = [{n: data.rows.dtype[n] for n in data.rows.dtype.names or ()} for data in sets]
     wanted = dict.fromkeys(name for own in types for name in own if name not in _OWN)
     columns: dict[str, str] = {
@@ -337,13 +338,13 @@ def _columns(
     faults = []
     for name in wanted:
         if name in columns:
-            continue  # of an earlier merge: the nearer source is told
+            continue  # from an earlier merge: the nearer source is recorded
         there = [own[name] for own in types if name in own]
         lacking = tuple(n for n, own in zip(names, types, strict=True) if name not in own)
         if len({kind.kind == "S" for kind in there}) > 1:
             faults.append(f"column {name} must be of words or of numbers in all; rename one")
             continue
-        if name == GROUP_NAME:  # told by the number of the group where there is none
+        if name == GROUP_NAME:  # without it, the number of the group takes its place
             width = max(_LONGEST_NUMBER, *(kind.itemsize for kind in there))
             columns[name] = f"S{width + 1 + max(len(n.encode()) for n in names)}"
             continue
@@ -356,7 +357,7 @@ def _columns(
 
 
 def _common_type(kinds: Sequence[np.dtype[Any]], *, whole: bool) -> str:
-    """Type that holds all values; only floats and texts can say that there is none."""
+    """Type that holds all values; only floats and texts can express a missing value."""
     common = np.result_type(*kinds)
     if not whole and common.kind not in "Sf":
         return "<f8"

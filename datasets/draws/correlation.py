@@ -1,4 +1,4 @@
-"""Draws that go together: a Gaussian copula between draws of one level of a recipe."""
+"""Correlated draws: a Gaussian copula between draws of one level of a recipe."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,14 +16,14 @@ from .draws import Axis, Draw, Range
 
 Float = NDArray[np.float64]
 
-_LEAST_EIGENVALUE = 1e-6  # of a correlation matrix: below it two draws are one
+_LEAST_EIGENVALUE = 1e-6  # of a correlation matrix: below it two draws are practically one
 
 
 class Correlation(Part):
-    """Draws whose ranks go together, each pair of them alike."""
+    """Draws with correlated ranks, the same for every pair."""
 
     paths: tuple[str, ...] = Field(min_length=2, description="draws of one level, as written there")
-    rank: float = Field(gt=-1, lt=1, description="Spearman's rank correlation of every pair")
+    rank: float = Field(gt=-1, lt=1, description="Spearman's rank correlation of each pair")
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Copula:
     Attributes
     ----------
     places : numpy.ndarray of int [shape=(n,)]
-        Which coordinates, rising.
+        Indices of the coordinates, rising.
     factor : numpy.ndarray [shape=(n, n)]
-        Lower triangular; its product with independent normal values has the correlation.
+        Lower triangular matrix; its product with independent normal values has the correlation.
     """
 
     places: NDArray[np.int64]
@@ -49,12 +49,12 @@ class Copula:
 
 
 def pearson(rank: float) -> float:
-    """Correlation of two normal values whose ranks have a correlation.
+    """Correlation of two normal values whose ranks have a given correlation.
 
     Parameters
     ----------
     rank : float
-        Spearman's, -1 to 1.
+        Spearman's rank correlation, -1 to 1.
 
     Returns
     -------
@@ -79,23 +79,23 @@ def copula_of(
     levels: Mapping[str, Sequence[tuple[Draw, Sequence[Axis]]]],
     faults: list[str],
 ) -> dict[str, Copula]:
-    """Resolve correlations; each is of the level that its draws are of.
+    """Resolve correlations, each of which must be between draws of one level.
 
     Parameters
     ----------
     correlations : sequence of Correlation
-        As the recipe has them.
+        Correlations as in the recipe.
     levels : mapping
-        Name of a level -> its draws, each with the axes that its path stands for. Of two draws
-        with ``*`` the first entries go together, the second ones, and so on.
+        Draws of each level, by its name, each with the axes that its path matches. For two draws
+        with ``*``, the first entries are correlated, the second ones, and so on.
     faults : list of str
-        Added to: draws that are none, of several levels, of no single number or of unequal
-        number, pairs given twice, and correlations that contradict each other.
+        List to which faults are added: paths that are not drawn, draws of several levels, of tables
+        or of unequal number, pairs given twice, and correlations that contradict each other.
 
     Returns
     -------
     dict of str to Copula
-        By level; none for a level without correlations.
+        Copula by level; none for a level without correlations.
     """
     ranks: dict[str, dict[tuple[str, str], float]] = {name: {} for name in levels}
     for number, correlation in enumerate(correlations):
@@ -144,12 +144,12 @@ def _rows(
 def _where(
     path: str, levels: Mapping[str, Sequence[tuple[Draw, Sequence[Axis]]]]
 ) -> tuple[str, Sequence[Axis]]:
-    """Level and axes of a draw by its path, or of one list entry of it."""
+    """Level and axes of a draw by its path, or by that of one of its list entries."""
     for name, draws in levels.items():
         for draw, axes in draws:
             if draw.path == path:
                 if not axes:
-                    raise SceneError(path, [])  # at fault itself, which is told already
+                    raise SceneError(path, [])  # its own fault has been reported
                 return name, axes
             single = [axis for axis in axes if axis.path == path]
             if single:

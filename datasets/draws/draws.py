@@ -1,4 +1,4 @@
-"""Values drawn around a scene: what a recipe says of them, resolved against the scene."""
+"""Values drawn around a scene, as specified in a recipe and resolved against the scene."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -24,12 +24,12 @@ class Draw(Part):
 
     path: str = Field(description="dotted path of the scene; * stands for every list entry")
     distribution: Literal["uniform", "log-uniform", "factor", "log-factor", "relative-normal"] = (
-        Field(description="of the value itself, of a factor on the scene's, or of a change")
+        Field(description="what is drawn: the value itself, a factor on the scene's, or a change")
     )
-    low: Bound | None = Field(default=None, description="lower end; of a factor, its least")
-    high: Bound | None = Field(default=None, description="upper end; of a factor, its most")
+    low: Bound | None = Field(default=None, description="lower end, or smallest factor")
+    high: Bound | None = Field(default=None, description="upper end, or largest factor")
     bands: tuple[tuple[Bound, Bound], ...] = Field(
-        default=(), description="several ranges instead of low and high, likely as they are wide"
+        default=(), description="several ranges instead of low and high, weighted by their width"
     )
     scale: Ratio | None = Field(
         default=None,
@@ -39,7 +39,7 @@ class Draw(Part):
     )
 
     @model_validator(mode="after")
-    def _one_way_to_say_it(self) -> Self:
+    def _consistent_bounds(self) -> Self:
         vector = self.distribution == "relative-normal"
         ends = [self.low is not None, self.high is not None]
         if vector and (self.scale is None or any(ends) or self.bands):
@@ -52,7 +52,7 @@ class Draw(Part):
 
     @property
     def ranges(self) -> tuple[tuple[Bound, Bound], ...]:
-        """Bands as written."""
+        """Bands as written in the recipe."""
         if self.low is not None and self.high is not None:
             return ((self.low, self.high),)
         return self.bands
@@ -60,14 +60,14 @@ class Draw(Part):
 
 @dataclass(frozen=True)
 class Kind:
-    """How a distribution reads its bounds: it is uniform in `scale` of the value.
+    """Meaning of the bounds of a distribution, which is uniform in `scale` of the value.
 
     Attributes
     ----------
     relative : bool
-        Bounds multiply the scene's own value.
+        Whether bounds multiply the scene's own value.
     scale, back : callable
-        Into the scale, and out of it.
+        Transformation to the scale, and its inverse.
     """
 
     relative: bool
@@ -91,11 +91,11 @@ class Range:
     Attributes
     ----------
     path : str
-        Of the scene.
+        Path in the scene.
     kind : Kind
-        How it is spread.
+        Kind of distribution.
     bands : tuple of (float, float)
-        Rising [SI].
+        Bands, rising [SI].
     """
 
     path: str
@@ -104,7 +104,7 @@ class Range:
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Name of the one coordinate that it is drawn from."""
+        """Name of its one coordinate."""
         return (self.path,)
 
     def value(self, coordinates: Sequence[float]) -> float:
@@ -119,7 +119,7 @@ class Range:
         return self.bands[-1][1]
 
     def extremes(self) -> tuple[float, float]:
-        """Least and largest value."""
+        """Smallest and largest value."""
         return self.bands[0][0], self.bands[-1][1]
 
 
@@ -130,7 +130,7 @@ class Vector:
     Attributes
     ----------
     path : str
-        Of the scene.
+        Path in the scene.
     base : mapping
         The scene's own numbers.
     scale : float
@@ -143,13 +143,13 @@ class Vector:
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """Names of the coordinates that it is drawn from, one for each number."""
+        """Names of its coordinates, one for each number."""
         return tuple(f"{self.path}.{key}" for key in self.base)
 
     def value(self, coordinates: Sequence[float]) -> dict[str, float]:
-        """Table at coordinates in (0, 1), as far along any direction [shape=(n_numbers,)]."""
+        """Table at coordinates in (0, 1) [shape=(n_numbers,)], with no preferred direction."""
         centre = np.array(list(self.base.values()))
-        change = ndtri(np.asarray(coordinates))  # normal, so that no direction is favoured
+        change = ndtri(np.asarray(coordinates))  # normal, so that no direction is preferred
         change *= self.scale * np.linalg.norm(centre) / np.linalg.norm(change)
         return dict(zip(self.base, (centre + change).tolist(), strict=True))
 
@@ -169,16 +169,16 @@ def axes_of(
     Parameters
     ----------
     places : mapping
-        Place in the recipe, for messages -> draw.
+        Draws by their place in the recipe, for messages.
     base : mapping
         Table of the scene.
     faults : list of str
-        Added to: paths the scene does not have, bounds it refuses.
+        List to which faults are added: paths that the scene lacks, bounds that it refuses.
 
     Returns
     -------
     dict
-        Place -> one axis for every value the draw's path stands for; none where it is at fault.
+        By place: one axis for every value that the draw's path matches; none if it is faulty.
     """
     axes: dict[str, list[Axis]] = {}
     whole = _Whole(base, scene_from_table(base))
@@ -193,12 +193,12 @@ def axes_of(
 
 
 def matches(base: Mapping[str, Any], pattern: str) -> list[str]:
-    """Every path of the scene that a pattern with ``*`` stands for.
+    """All paths of the scene that a pattern with ``*`` matches.
 
     Raises
     ------
     SceneError
-        A ``*`` stands where the scene has no list.
+        If a ``*`` stands where the scene has no list.
 
     Examples
     --------
@@ -225,16 +225,16 @@ def _node(base: Any, path: str) -> Any:
 
 
 class _Whole(NamedTuple):
-    """A scene as a table and as it is validated: parts that stay need not be validated again."""
+    """A scene as a table and validated: unchanged parts need not be validated again."""
 
     base: Mapping[str, Any]
     scene: Scene
 
     def changed(self, values: Mapping[str, Any]) -> Scene:
-        """The scene with values replaced by dotted path, or why it is none, in its own words."""
+        """The scene with values replaced by dotted path, or its own error if it refuses them."""
         try:
             return with_values(self.scene, values)
-        except (SceneError, AttributeError):  # tables that are no parts, such as shapes of modes
+        except (SceneError, AttributeError):  # tables that are not parts, such as mode shapes
             return scene_from_table(override(self.base, values))
 
 
@@ -277,7 +277,7 @@ def _refuse_bands(path: str, bands: tuple[tuple[float, float], ...], *, positive
 
 
 def _in_si(whole: _Whole, path: str, value: Bound) -> float:
-    """Bound in SI, by letting the scene itself read it."""
+    """Bound in SI, parsed by the scene itself."""
     values = {path: value}
     scene = whole.changed(values)
     if not has_value(scene, path):
@@ -296,7 +296,7 @@ def _own_value(whole: _Whole, path: str) -> Any:
 
 
 def _refuse_path(base: Mapping[str, Any], path: str) -> NoReturn:
-    """Refuse a path that a scene lacks, in the scene's words."""
+    """Refuse a path that a scene lacks, with the scene's own message."""
     scene_from_table(override(base, {path: 0.0}))  # names the nearest key
     by_number = numbered(base, path)
     cure = (
@@ -313,7 +313,7 @@ def value_at(node: Any, path: str) -> Any:
     Raises
     ------
     AttributeError, KeyError, IndexError, ValueError
-        The scene has no such path.
+        If the scene has no such path.
     """
     for key in path.split("."):
         if isinstance(node, Mapping):
@@ -326,7 +326,7 @@ def value_at(node: Any, path: str) -> Any:
 
 
 def has_value(scene: Scene, path: str) -> bool:
-    """True where the scene has something at a dotted path."""
+    """Whether the scene has a value at a dotted path."""
     try:
         value_at(scene, path)
     except (AttributeError, KeyError, IndexError, ValueError):

@@ -1,4 +1,4 @@
-"""Regions of conditions or severities that a recipe declares for testing, not for training."""
+"""Regions of conditions or severities that a recipe reserves for testing."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,17 +23,17 @@ DIMENSIONS = {
     "_n": "force",
     "_m": "length",
 }
-"""Ending of a manifest column -> dimension of its bounds; the first that fits."""
+"""Dimension of the bounds of a manifest column by its ending; the first match counts."""
 
 
 class Bounds(Part):
-    """A range of one manifest column; without an end it is open there.
+    """A range of one manifest column; without a bound it is open on that side.
 
     A bound is a number in SI, a text with a unit, or a share of the scene's own value: ``110 %``.
     """
 
-    low: Bound | None = Field(default=None, description="lower end; none is open")
-    high: Bound | None = Field(default=None, description="upper end; none is open")
+    low: Bound | None = Field(default=None, description="lower end; open if left out")
+    high: Bound | None = Field(default=None, description="upper end; open if left out")
 
     @model_validator(mode="after")
     def _an_end(self) -> Self:
@@ -43,10 +43,10 @@ class Bounds(Part):
 
 
 class Region(Part):
-    """What a recipe says of a region: the records within all bounds are held out."""
+    """A region in a recipe: the records within all bounds are held out."""
 
-    name: str = Field(pattern="^[a-z][a-z0-9_]*$", max_length=48, description="of the split")
-    bounds: dict[str, Bounds] = Field(min_length=1, description="by manifest column")
+    name: str = Field(pattern="^[a-z][a-z0-9_]*$", max_length=48, description="name of the split")
+    bounds: dict[str, Bounds] = Field(min_length=1, description="bounds by manifest column")
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,10 @@ class HeldOut:
     Attributes
     ----------
     name : str
-        Unique in the recipe.
+        Name, unique in the recipe.
     bounds : mapping of str to (float, float)
-        Manifest column -> least and greatest value [SI], both inside; infinite where open. A
-        record lies in the region where it is within all of them.
+        Smallest and largest value [SI] by manifest column, inclusive; infinite if open. A record
+        lies in the region if it is within all of them.
     """
 
     name: str
@@ -74,28 +74,28 @@ def regions_of(
     base: Mapping[str, Any],
     faults: list[str],
 ) -> tuple[HeldOut, ...]:
-    """Resolve regions against what is drawn.
+    """Resolve regions against the draws.
 
     Parameters
     ----------
     regions : sequence of Region
-        As the recipe has them.
+        Regions as in the recipe.
     columns : mapping
-        Manifest columns that may be bounded -> scene value.
+        Scene value of each manifest column that may be bounded.
     axes : sequence of Axis
-        What is drawn for every record or machine.
+        Draws for every record or machine.
     sometimes : sequence of Axis
-        What is drawn where a confounder is present.
+        Draws that apply if a confounder is present.
     base : mapping
         Table of the scene.
     faults : list of str
-        Added to: names given twice, unknown columns, bounds of another dimension or in the wrong
-        order, regions in which no record or every record would lie.
+        List to which faults are added: names given twice, unknown columns, bounds of another
+        dimension or in the wrong order, regions that contain no record or every record.
 
     Returns
     -------
     tuple of HeldOut
-        Those without fault.
+        The valid regions.
     """
     names = [region.name for region in regions]
     faults += [
@@ -168,7 +168,7 @@ def _refuse_all_or_none(
 
 
 def _meet(ends: tuple[float, float], span: tuple[float, float]) -> bool:
-    """More than an edge in common, unless the span is a single value."""
+    """Whether they share more than an edge, unless the span is a single value."""
     low, high = max(ends[0], span[0]), min(ends[1], span[1])
     return low < high or (span[0] == span[1] and low == high)
 
@@ -184,7 +184,7 @@ def _shown(spans: _Spans) -> str:
 def _spans(
     path: str, axes: Sequence[Axis], sometimes: Sequence[Axis], base: Mapping[str, Any]
 ) -> _Spans:
-    """Ranges of a scene value: those it is drawn from, or its own and those of its faults."""
+    """Ranges of a scene value: as drawn, or its own value and those of its faults."""
     always = _bands(path, axes) or [_span_beside(path, axes, base)]
     return [*always, *_bands(path, sometimes)]
 
@@ -197,7 +197,7 @@ def _bands(path: str, axes: Sequence[Axis]) -> list[tuple[float, float]]:
 def _span_beside(path: str, axes: Sequence[Axis], base: Mapping[str, Any]) -> tuple[float, float]:
     """Range of a value that is not drawn itself but may follow from draws of its table.
 
-    As a viscosity from a temperature: taken to rise or fall with each of them throughout.
+    For example a viscosity from a temperature; it is assumed to be monotonic in each of them.
     """
 
     def value(changes: Mapping[str, Any]) -> float:

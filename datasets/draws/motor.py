@@ -1,7 +1,8 @@
-"""Motors on the mains in recipes that draw a speed: the motor turns as fast as the label says.
+"""Mains-fed motors in recipes that draw a speed: the synchronous speed follows the label.
 
-A motor with ``synchronous_speed`` ignores ``drive.speed``, which is the label of a record. Where a
-recipe draws ``drive.speed`` and not the motor's own, the motor is taken along, as by a converter.
+A motor with ``synchronous_speed`` ignores ``drive.speed``, which is the label of a record. If a
+recipe draws ``drive.speed`` and not the motor's own speed, the motor is scaled with it, as with a
+frequency converter.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,17 +16,18 @@ from .options import Alternatives
 
 SPEED, OWN = "drive.speed", "drive.motor.synchronous_speed"
 LARGEST_SLIP = 0.05
-"""Of ``drive.speed`` below ``synchronous_speed``: by so much, at most, the label can be wrong."""
+"""Largest slip of ``drive.speed`` below ``synchronous_speed`` [-]: the largest error of the
+label."""
 
 
 def motor_speed(scene: Scene, speed: float) -> dict[str, float]:
-    """Synchronous speed [Hz] by its path, at another drive.speed; empty where that governs it.
+    """Synchronous speed [Hz] by its path at another drive.speed; empty if that one counts.
 
     Parameters
     ----------
     scene : Scene
     speed : float
-        [Hz]
+        Speed [Hz].
 
     Examples
     --------
@@ -44,14 +46,14 @@ def motor_speed(scene: Scene, speed: float) -> dict[str, float]:
 
 
 def taken_along(base: Mapping[str, Any], drawn: Mapping[str, Any]) -> dict[str, float]:
-    """Synchronous speed of a record by its path; empty where drive.speed governs the motor.
+    """Synchronous speed of a record by its path; empty if drive.speed determines the speed.
 
     Parameters
     ----------
     base : mapping
         Table of the scene.
     drawn : mapping
-        Dotted path -> value [SI].
+        Drawn values [SI] by dotted path.
     """
     if SPEED not in drawn:
         return {}
@@ -62,21 +64,21 @@ def taken_along(base: Mapping[str, Any], drawn: Mapping[str, Any]) -> dict[str, 
 def motors_to_take(
     base: Mapping[str, Any], axes: Iterable[Axis], choices: Sequence[Alternatives]
 ) -> list[tuple[float, float]]:
-    """Speeds of the motors on the mains that a recipe takes along.
+    """Speeds of the mains-fed motors that a recipe scales with the drawn speed.
 
     Parameters
     ----------
     base : mapping
         Table of the scene.
     axes : iterable of Axis
-        Of machines and records.
+        Draws of machines and records.
     choices : sequence of Alternatives
 
     Returns
     -------
     list of tuple of float
-        ``drive.speed`` and ``synchronous_speed`` [Hz] of the scene and its options; empty where
-        the recipe draws no speed, or that of the motor too.
+        ``drive.speed`` and ``synchronous_speed`` [Hz] of the scene and its options; empty if the
+        recipe draws no speed, or that of the motor too.
     """
     options = [option for each in choices for option in each.options]
     drawn = {axis.path for axis in (*axes, *(axis for each in options for axis in each.axes))}
@@ -84,7 +86,7 @@ def motors_to_take(
         return []
     found = []
     for values in ({}, *(option.values for option in options)):
-        with suppress(SceneError):  # told where the option is read
+        with suppress(SceneError):  # reported where the option is read
             drive: Any = getattr(scene_from_table(override(base, values)), "drive", None)
             if getattr(drive, "rung", "") == "motor" and drive.motor.synchronous_speed is not None:
                 found.append((drive.speed, drive.motor.synchronous_speed))
@@ -92,7 +94,7 @@ def motors_to_take(
 
 
 def motor_faults(motors: Iterable[tuple[float, float]]) -> list[str]:
-    """What keeps motors, of :func:`motors_to_take`, from turning as fast as the label says.
+    """Faults of motors (see :func:`motors_to_take`) whose speed differs from the label.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Discrete draws of a recipe: one option among several, with values and draws of its own."""
+"""Discrete draws of a recipe: one option among several, with its own values and draws."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,30 +17,32 @@ _LONGEST = 32  # characters of an option's name, in the manifest
 
 
 class Option(Part):
-    """One way in which a machine may be: scene values that belong together."""
+    """One variant of a machine: scene values that belong together."""
 
-    name: str = Field(pattern=_WORD, max_length=_LONGEST, description="in the manifest")
-    weight: Ratio = Field(default=1.0, gt=0, description="how often, beside the other options")
+    name: str = Field(pattern=_WORD, max_length=_LONGEST, description="name in the manifest")
+    weight: Ratio = Field(
+        default=1.0, gt=0, description="probability relative to the other options"
+    )
     values: dict[str, Bound | bool] = Field(
         default={}, description="scene values it sets, by dotted path in quotes"
     )
-    draw: tuple[Draw, ...] = Field(default=(), description="scene values drawn where it is taken")
+    draw: tuple[Draw, ...] = Field(default=(), description="scene values drawn with this option")
 
 
 class OptionSet(Part):
-    """A choice that nobody can make for the machine: a law, a rung, a condition."""
+    """A choice that cannot be settled for the machine: a law, a rung, a condition."""
 
-    name: str = Field(pattern="^[a-z][a-z0-9_]*$", max_length=48, description="of its column")
+    name: str = Field(pattern="^[a-z][a-z0-9_]*$", max_length=48, description="name of its column")
     per: Literal["machine", "record"] = Field(
         default="machine",
         description="whether a machine keeps its option, or every record draws its own",
     )
     option: tuple[Option, ...] = Field(
-        min_length=2, description="the ways to choose from, each with its weight"
+        min_length=2, description="the alternatives, each with its weight"
     )
 
     @model_validator(mode="after")
-    def _told_apart(self) -> Self:
+    def _names_differ(self) -> Self:
         names = [option.name for option in self.option]
         if len(set(names)) < len(names):
             raise ValueError(f"options of {self.name} = {', '.join(names)} must differ; rename one")
@@ -49,7 +51,7 @@ class OptionSet(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Taken:
-    """An option against its scene.
+    """An option resolved against its scene.
 
     Attributes
     ----------
@@ -57,9 +59,9 @@ class Taken:
     share : float
         Probability.
     values : mapping
-        Dotted path of the scene -> value.
+        Scene values by dotted path.
     axes : tuple of Axis
-        What is drawn with it.
+        Draws of the option.
     """
 
     name: str
@@ -69,13 +71,13 @@ class Taken:
 
     @property
     def paths(self) -> set[str]:
-        """Scene values that it decides."""
+        """Paths of the scene values that it determines."""
         return {*self.values, *(axis.path for axis in self.axes)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Alternatives:
-    """An option set against its scene.
+    """An option set resolved against its scene.
 
     Attributes
     ----------
@@ -96,12 +98,12 @@ class Alternatives:
 
     @property
     def paths(self) -> set[str]:
-        """Scene values that any option decides."""
+        """Paths of the scene values that any option determines."""
         return {path for option in self.options for path in option.paths}
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the numbers that it is drawn by: of the option, then of what options draw."""
+        """Names of its coordinates: that of the option, then those of the options' draws."""
         entries = [e for option in self.options for axis in option.axes for e in axis.entries]
         return (self.name, *dict.fromkeys(f"{self.name}.{entry}" for entry in entries))
 
@@ -111,8 +113,8 @@ class Alternatives:
         Parameters
         ----------
         at : callable
-            Number in (0, 1) of every name of `coordinates`. An option's draws do not depend on
-            which other options there are.
+            Number in (0, 1) for every name in `coordinates`. An option's draws do not depend on the
+            other options.
         """
         left = at(self.name)
         chosen = self.options[-1]
@@ -139,7 +141,8 @@ def alternatives_of(
     base : mapping
         Table of the scene.
     faults : list of str
-        Added to: an option that the scene refuses, with its draws; a value decided twice.
+        List to which faults are added: options that the scene refuses, with their draws; values
+        determined twice.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Points of the unit cube that a data set is drawn from: even, repeatable, one record at a time.
+"""Points of the unit cube from which a data set is drawn: even, reproducible, in any order.
 
-Every dimension has a name, which decides its randomisation, and a slot, which decides its place in
-a Sobol sequence. A point depends on the random stream, the names and its number alone, so that
-records can be made in any order, and a dimension added to others moves none of them.
+Every dimension has a name, which determines its randomisation, and a slot, which determines its
+place in a Sobol sequence. A point depends only on the random stream, the names and its number, so
+that records can be made in any order, and an added dimension does not change the others.
 """
 
 import hashlib
@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 Rng = Callable[..., np.random.Generator]
-"""Random stream of its own for every key of whole numbers."""
+"""Independent random stream for every key of whole numbers."""
 
 Sampling = Literal["sobol", "latin-hypercube", "random"]
 
 BLOCK = 16
-"""Points of a block: each dimension has one of them in each of that many equal parts, but for
-``random``. Severities in so many grades and sixteenths balance a set of some dozen records."""
+"""Points of a block: except with ``random``, each dimension has one of them in each of this many
+equal parts. Severities in as many grades and sixteenths balance a set of some dozen records."""
 
 SET = 3
 """Dimensions of one Sobol sequence. Further ones lie on curves over some of the first: the four
-nearest points in one tell the other with an R^2 of .3 to .8 (in three .26, of free draws .16 at
-worst), so that a condition would tell a severity."""
+nearest points in one dimension predict the other with an R^2 of .3 to .8 (with three dimensions
+.26, with free draws .16 at worst), so that a condition would predict a severity."""
 
 _SHUFFLE, _SCRAMBLE, _FREE = range(3)
 _DIGITS = 30  # binary, of a coordinate: ten times as many points as a data set may have records
@@ -40,9 +40,10 @@ class CubeAxis:
     Attributes
     ----------
     name : str
-        Decides its random numbers.
+        Name, which determines its random numbers.
     slot : int
-        Decides its Sobol dimension: those of equal ``slot // SET`` form one sequence.
+        Slot, which determines its Sobol dimension: those of equal ``slot // SET`` form one
+        sequence.
     """
 
     name: str
@@ -50,7 +51,7 @@ class CubeAxis:
 
 
 def number_of(word: str) -> int:
-    """64 bits of a word, the same on every machine.
+    """Hash of a word to 64 bits, the same on every machine.
 
     Examples
     --------
@@ -66,24 +67,24 @@ class Points:
     Parameters
     ----------
     method : {"sobol", "latin-hypercube", "random"}
-        How even they are; see Notes.
+        Sampling method; see Notes.
     rng : callable
         ``rng(*key)`` is a generator that depends on the key alone.
     dimensions : sequence of CubeAxis
-        In the order of the coordinates; names and slots must differ.
+        Axes in the order of the coordinates; names and slots must differ.
 
     Notes
     -----
-    ``sobol``: dimensions share Sobol sequences of `SET`. Each dimension is scrambled by a random
-    linear map of its digits and a digital shift of its own, which keeps how even every projection
-    is; the order within each block of `BLOCK` points is shuffled, for each sequence apart: else
-    even and odd points lie in different halves, and points of two sequences in related places. So
-    dimensions of one sequence are even together, those of two are each even and paired at random.
-    ``latin-hypercube``: in every block each dimension has one point in each of `BLOCK`
-    equal parts, paired at random. ``random``: free draws.
+    ``sobol``: dimensions share Sobol sequences of `SET`. Each dimension is scrambled by its own
+    random linear map of the digits and digital shift, which preserves the evenness of every
+    projection; the order within each block of `BLOCK` points is shuffled for each sequence
+    separately. Otherwise even and odd points would lie in different halves, and points of two
+    sequences in related places. Dimensions of one sequence are thus even together; those of two are
+    each even and paired at random. ``latin-hypercube``: in every block each dimension has one point
+    in each of `BLOCK` equal parts, paired at random. ``random``: independent draws.
 
-    A block costs some 0.3 ms for 70 dimensions. Points in rising order cost that once per block;
-    a jump in a Sobol sequence costs 10 ns a point skipped, once.
+    A block costs about 0.3 ms for 70 dimensions. Points in rising order cost that once per block; a
+    jump in a Sobol sequence costs 10 ns per skipped point, once.
 
     References
     ----------
@@ -130,7 +131,7 @@ class _Sobol:
         scrambles = [_scramble(rng(_SCRAMBLE, number_of(d.name))) for d in dimensions]
         self._maps = np.array([m for m, _ in scrambles], dtype=np.int64).reshape(-1, _DIGITS)
         self._shifts = np.array([shift for _, shift in scrambles], dtype=np.int64)
-        from scipy.stats import qmc  # half a second, which only drawing needs
+        from scipy.stats import qmc  # import takes half a second, and only drawing needs it
 
         self._sequence = qmc.Sobol(SET, scramble=False, bits=_DIGITS)
         self._next = 0
@@ -146,10 +147,10 @@ class _Sobol:
         return result
 
     def _raw(self, block: int) -> NDArray[np.int64]:
-        """Points of a block before they are scrambled, as whole numbers [shape=(BLOCK, SET)]."""
+        """Points of a block before scrambling, as whole numbers [shape=(BLOCK, SET)]."""
         if block != self._next:
             self._sequence.reset()
-            if block:  # scipy takes no step of none
+            if block:  # scipy cannot skip zero points
                 self._sequence.fast_forward(block * BLOCK)
         self._next = block + 1
         scaled: NDArray[np.int64] = (self._sequence.random(BLOCK) * 2**_DIGITS).astype(np.int64)
@@ -160,12 +161,12 @@ class _Sobol:
 
 
 def _scramble(rng: np.random.Generator) -> tuple[NDArray[np.int64], int]:
-    """A random map of digits onto themselves and lower ones, by its columns, and a shift."""
+    """Random map of digits onto themselves and lower ones, by its columns, and a shift."""
     return _POWERS + rng.integers(0, _POWERS), int(rng.integers(0, 2**_DIGITS))
 
 
 def _hypercube(rng: Rng, dimensions: Sequence[CubeAxis]) -> Callable[[int], Float]:
-    # scipy's own draws all dimensions from one stream: one more would move the others
+    # scipy's own draws all dimensions from one stream: an added one would change the others
     def one(free: np.random.Generator) -> Float:
         return (free.permutation(BLOCK) + free.random(BLOCK)) / BLOCK
 
@@ -182,7 +183,7 @@ def _each(
     block: int,
     one: Callable[[np.random.Generator], Float],
 ) -> Float:
-    """A block in which every dimension is drawn apart, inside the unit interval."""
+    """A block in which every dimension is drawn separately, inside the unit interval."""
     columns = [one(rng(_FREE, number_of(dimension.name), block)) for dimension in dimensions]
     inside = np.clip(np.array(columns), 2.0**-54, None)  # a generator may return zero
     return inside.reshape(-1, BLOCK).T
@@ -193,4 +194,4 @@ _METHODS: dict[Sampling, Callable[[Rng, Sequence[CubeAxis]], Callable[[int], Flo
     "latin-hypercube": _hypercube,
     "random": _random,
 }
-"""How a block of points is made. A new way is one row and its name in `Sampling`."""
+"""Construction of a block of points. A new method is one row and its name in `Sampling`."""

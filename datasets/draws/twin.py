@@ -1,8 +1,8 @@
-"""One machine among those that a recipe draws: what recordings say of its numbers, to draw from.
+"""Draws of one particular machine: distribution of its numbers as estimated from recordings.
 
 Every number that a recipe draws once per machine has a coordinate in (0, 1). A recipe draws them
-evenly and apart; a twin draws them by a Gaussian copula with narrower margins. So it says the same
-of a number as the recipe does, but for what was learnt.
+evenly and independently; a twin draws them by a Gaussian copula with narrower margins. It thus
+agrees with the recipe on all that the recordings leave undetermined.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,26 +24,26 @@ Float = NDArray[np.float64]
 
 _LEAST_EIGENVALUE = -1e-3  # of a correlation matrix written with four digits
 FARTHEST = 6.0
-"""Normal scores beyond this are drawn at it: a coordinate must stay inside (0, 1)."""
+"""Normal scores beyond this are set to it, so that a coordinate stays inside (0, 1)."""
 
 
 class TwinTable(Part):
-    """What recordings of one machine say of the numbers that a recipe draws."""
+    """Distribution of the numbers drawn by a recipe, as estimated for one machine."""
 
     share: Ratio = Field(
-        default=0.5, gt=0, le=0.9, description="machines that are the twin, beside those drawn"
+        default=0.5, gt=0, le=0.9, description="share of machines that are the twin"
     )
-    scene: str = Field(default="", description="that was calibrated, for reports")
-    recipe: str = Field(default="", description="that draws such machines; beside this file")
-    base: str = Field(default="", description="scene before calibration, built in or beside it")
+    scene: str = Field(default="", description="scene that was calibrated, for reports")
+    recipe: str = Field(default="", description="recipe of such machines, in the same folder")
+    base: str = Field(default="", description="scene before calibration, built in or in the folder")
     unknown: tuple[str, ...] = Field(
-        default=(), description="what was to be estimated; all that the recipe draws where empty"
+        default=(), description="what was to be estimated; if empty, all that the recipe draws"
     )
-    names: tuple[str, ...] = Field(min_length=1, description="coordinates, as the recipe has them")
-    mean: tuple[Ratio, ...] = Field(description="of each, in normal scores: 0 is the middle")
-    sd: tuple[Ratio, ...] = Field(description="of each, in normal scores: 1 is as the recipe draws")
+    names: tuple[str, ...] = Field(min_length=1, description="coordinates, named as in the recipe")
+    mean: tuple[Ratio, ...] = Field(description="means in normal scores: 0 is the middle")
+    sd: tuple[Ratio, ...] = Field(description="deviations in normal scores: 1 is as in the recipe")
     correlation: tuple[tuple[Ratio, ...], ...] = Field(
-        description="of the scores, lower triangle, row by row"
+        description="correlation of the scores, lower triangle, row by row"
     )
 
     @model_validator(mode="after")
@@ -77,14 +77,14 @@ class Twin:
     Attributes
     ----------
     table : TwinTable
-        What the file says.
+        Table of the file.
     """
 
     table: TwinTable
 
     @property
     def covariance(self) -> Float:
-        """Of the normal scores [shape=(n, n)]."""
+        """Covariance of the normal scores [shape=(n, n)]."""
         sd = np.array(self.table.sd)
         return np.asarray(self.table.matrix * np.outer(sd, sd))
 
@@ -114,13 +114,13 @@ def inside(scores: Float) -> Float:
 
 
 def coordinate_names(machine: Sequence[Axis], choices: Sequence[Alternatives]) -> tuple[str, ...]:
-    """Names of all coordinates that decide one machine of a recipe.
+    """Names of all coordinates that determine one machine of a recipe.
 
     Parameters
     ----------
     machine : sequence of Axis
     choices : sequence of Alternatives
-        Of a :class:`~.recipe.recipe.Recipe`.
+        Option sets of a :class:`~.recipe.recipe.Recipe`.
     """
     of_choices = [name for each in choices if each.per == "machine" for name in each.coordinates]
     return (*(entry for axis in machine for entry in axis.entries), *of_choices)
@@ -134,16 +134,16 @@ def machine_values(
     Parameters
     ----------
     machine, choices
-        As of :func:`coordinate_names`.
+        As for :func:`coordinate_names`.
     at : callable
-        Coordinate in (0, 1) of every name.
+        Returns the coordinate in (0, 1) of a name.
 
     Returns
     -------
     values : dict
-        Dotted path -> value [SI].
+        Scene values [SI] by dotted path.
     options : dict
-        Column of a choice -> option.
+        Option by column of the choice.
     """
     values = {axis.path: axis.value([at(entry) for entry in axis.entries]) for axis in machine}
     options = {}

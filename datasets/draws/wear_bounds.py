@@ -1,4 +1,4 @@
-"""Bounds of wear told by the limits of the scene, so that they follow it: ``150 % of limit``."""
+"""Bounds of wear relative to the limits of the scene, to follow it: ``150 % of limit``."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -22,11 +22,11 @@ class Limits(Protocol):
 
     @property
     def condemning(self) -> float:
-        """The part must be renewed above it [m]."""
+        """Wear above which the part must be renewed [m]."""
 
 
 def follows_limits(bound: Bound | None) -> bool:
-    """Whether a bound is told by wear limits.
+    """Whether a bound is relative to wear limits.
 
     Examples
     --------
@@ -38,24 +38,24 @@ def follows_limits(bound: Bound | None) -> bool:
 
 
 def bound_of_limits(bound: Bound, limits: Limits | None) -> Bound:
-    """A bound told by wear limits in metres; any other as it is.
+    """Bound in metres if it is relative to wear limits; otherwise unchanged.
 
     Parameters
     ----------
     bound : float or str
         ``as new``, or a share of the condemning limit such as ``150 % of limit``.
     limits : Limits or None
-        Of the scene for the severity; None where it has none.
+        Wear limits of the scene for the severity; None if it has none.
 
     Returns
     -------
     float or str
-        [m]
+        Bound [m].
 
     Raises
     ------
     ValueError
-        There are no limits, or the share is none.
+        If there are no limits, or the share is invalid.
     """
     if not follows_limits(bound):
         return bound
@@ -68,19 +68,19 @@ def bound_of_limits(bound: Bound, limits: Limits | None) -> Bound:
 def foreign_bounds(
     inherited: Mapping[str, Sequence[Mapping[str, Any]]], scene: str, other: str
 ) -> list[str]:
-    """Bounds taken over from a recipe of another scene, which follow no limit of this one.
+    """Faults of bounds inherited from a recipe of another scene that do not follow its limits.
 
     Parameters
     ----------
     inherited : mapping
-        ``severity`` and ``held_out`` of the recipe extended, without what is given anew.
+        ``severity`` and ``held_out`` of the extended recipe, without those given again.
     scene, other : str
-        Of this recipe and of the one extended.
+        Scene of this recipe and of the extended one.
 
     Returns
     -------
     list of str
-        Faults.
+        Faults, one message each.
     """
     cure = (
         f"is of the scene {other}, must be of {scene}; give it again, name it in without, or give "

@@ -1,4 +1,4 @@
-"""File attributes of a data set, and the hashes that guard them, its manifest and its signals."""
+"""File attributes of a data set, and the hashes that protect them, its manifest and its signals."""
 
 import hashlib
 import json
@@ -19,7 +19,7 @@ from ...sim.output.recording import DataError, SignalLayout
 from ...sim.output.sensor import Channel
 
 LARGEST_TEXT = 60_000
-"""Longest text of one file attribute [byte]; HDF5 holds 64 KiB."""
+"""Longest text of one file attribute [byte]; HDF5 allows 64 KiB."""
 
 _LIBRARIES = ("numpy", "scipy", "numba", "h5py")
 _TEXTS = (
@@ -31,43 +31,43 @@ _LATER_TEXTS = {"fidelity": "", "merged_from": ""}
 """Texts that older files lack."""
 
 HASHES = ("attributes_sha256", "manifest_sha256")
-"""Attributes that hold the hash of all other attributes, and of the manifest."""
+"""Attributes holding the hash of all other attributes, and that of the manifest."""
 
 
-@cache  # each look-up reads a file: a sixth of the time of a small data set
+@cache  # each look-up reads a file, which takes a sixth of the time of a small data set
 def _library_versions() -> str:
-    """Versions of what the records depend on, as JSON."""
+    """Versions of the libraries that the records depend on, as JSON."""
     return json.dumps({name: version(name) for name in _LIBRARIES})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Attributes(SignalLayout):
-    """What holds for every record of a data set file.
+    """Properties common to all records of a data set file.
 
     Parameters
     ----------
     sample_rate, channels, tacho, pulses_per_revolution, origin
-        As of :class:`~...sim.output.recording.SignalLayout`.
+        As in :class:`~...sim.output.recording.SignalLayout`.
     severities : tuple of str
-        Manifest columns that say how worn each record is [SI].
+        Manifest columns that hold the wear of each record [SI].
     grade_edges : tuple of float
-        Clearances at which grades 1, 2, 3 begin [m]; empty where unknown.
+        Clearances at which grades 1, 2, 3 begin [m]; empty if unknown.
     condemning_limit : float
-        [m]; NaN where unknown.
+        Wear at which the part must be renewed [m]; NaN if unknown.
     limit_source : str
-        Where the limits are from.
+        Source of the limits.
     recipe, scene : str
-        Their TOML text.
+        TOML text of the recipe and of the scene.
     overrides : str
-        JSON table of what replaced values of the recipe.
+        JSON table of the replaced values of the recipe.
     fidelity : str
-        JSON of the choice of rungs for the whole set; empty where they are as written.
+        JSON of the choice of rungs for the whole set; empty if they are those of the scene.
     merged_from : str
-        JSON of the data sets that were merged into this one; empty where it is none of those.
+        JSON of the data sets that were merged into this one; empty if it was not merged.
     seed : int
         Seed of the data set.
     truth : bool
-        Hidden quantities are stored.
+        Whether hidden quantities are stored.
     created_by, libraries : str
         Program and libraries, with versions.
     """
@@ -114,7 +114,7 @@ def _check_wear(item: Attributes) -> None:
 
 
 def texts_of(attributes: Attributes) -> dict[str, str]:
-    """The long ones of the attributes, which the file holds as they are."""
+    """Long texts among the attributes, which the file stores unchanged."""
     return {name: getattr(attributes, name) for name in _TEXTS}
 
 
@@ -134,13 +134,13 @@ def attributes_of(stored: Mapping[str, Any]) -> Attributes:
         condemning_limit=float(stored["condemning_limit_m"]),
         seed=int(stored["seed"]),
         truth=bool(stored["truth"]),
-        # a set made before rungs could be chosen has none
+        # absent in a set made before rungs could be chosen
         **{name: str({**_LATER_TEXTS, **stored}[name]) for name in _TEXTS},
     )
 
 
 def named(path: Path, stored: Mapping[str, Any]) -> Attributes:
-    """Attributes of a file; what is wrong with them names it."""
+    """Attributes of a file, whose path is named in error messages."""
     try:
         return attributes_of(stored)
     except DataError as error:
@@ -149,7 +149,7 @@ def named(path: Path, stored: Mapping[str, Any]) -> Attributes:
 
 
 def signal_checksum(signal: NDArray[np.float32]) -> int:
-    """Checksum of a record's signal, as its manifest row holds it.
+    """Checksum of a record's signal, as in its manifest row.
 
     Examples
     --------
@@ -165,12 +165,12 @@ def text_hash(text: str) -> str:
 
 
 def attributes_hash(stored: Mapping[str, Any]) -> str:
-    """Hash of a file's attributes, the hashes left out.
+    """Hash of a file's attributes without the hashes themselves.
 
     Parameters
     ----------
     stored : mapping
-        As h5py gives them.
+        Attributes as read by h5py.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def manifest_hash(rows: NDArray[np.void]) -> str:
     Parameters
     ----------
     rows : numpy.ndarray [shape=(n_records,)]
-        Structured, as in the file.
+        Manifest, structured as in the file.
 
     Examples
     --------
@@ -206,7 +206,7 @@ def manifest_hash(rows: NDArray[np.void]) -> str:
 
 
 def stamped(stored: Mapping[str, Any], rows: NDArray[np.void]) -> dict[str, Any]:
-    """A file's attributes with the hashes that belong to them.
+    """A file's attributes with matching hashes.
 
     Parameters
     ----------
@@ -221,11 +221,11 @@ def stamped(stored: Mapping[str, Any], rows: NDArray[np.void]) -> dict[str, Any]
 
 
 def refuse_other_hashes(stored: Mapping[str, Any], rows: NDArray[np.void], path: Path) -> None:
-    """Refuse altered labels; a file made before there were hashes is read as it is."""
+    """Refuse altered attributes or labels; a file made before there were hashes is accepted."""
     made = stamped(stored, rows)
     faults = [
         f"{path}: {name} is {_hex(stored[name])[:8]}…, must be {_hex(made[name])[:8]}…; take an "
-        "intact copy, or delete that attribute where the change was wanted"
+        "intact copy, or delete that attribute if the change is intended"
         for name in HASHES
         if name in stored and _hex(stored[name]) != _hex(made[name])
     ]

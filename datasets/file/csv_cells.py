@@ -15,7 +15,7 @@ _ESCAPED = re.compile(r"'[=+\-@\t\r\n]")
 def save_rows(
     path: Path, head: Sequence[str], rows: Iterable[Iterable[Any]], *, force: bool = True
 ) -> None:
-    """Write a table of safe cells as CSV, whole or not at all."""
+    """Write a table of safe cells as CSV, completely or not at all."""
     with (
         replacing(path, force=force) as fresh,
         fresh.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file,
@@ -26,14 +26,14 @@ def save_rows(
 
 
 def safe_cell(value: Any) -> Any:
-    """A cell as it may be written: text that begins like a formula gets an apostrophe before it.
+    """Cell in a safe form: text that begins like a formula gets a leading apostrophe.
 
-    Numbers stay as they are, also where they are texts.
+    Numbers stay as they are, even as text.
 
     Parameters
     ----------
     value : object
-        Anything that a cell can hold.
+        Value of the cell.
 
     Examples
     --------
@@ -51,7 +51,7 @@ def plain_cell(text: str) -> str:
     Parameters
     ----------
     text : str
-        A cell.
+        Cell as written.
 
     Examples
     --------
@@ -62,12 +62,12 @@ def plain_cell(text: str) -> str:
 
 
 def safe_frame(frame: Any) -> Any:
-    """A table (pandas.DataFrame) whose names and texts may be written as CSV.
+    """Table (pandas.DataFrame) whose names and texts may be written as CSV.
 
     Parameters
     ----------
     frame : pandas.DataFrame
-        Left as it is.
+        Table; not modified.
     """
     texts = [name for name, kind in frame.dtypes.items() if kind.kind in "OUT" or kind == "str"]
     changed = {name: [safe_cell(value) for value in frame[name]] for name in texts}

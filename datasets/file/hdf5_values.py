@@ -1,8 +1,8 @@
-"""Small values of an HDF5 file: how they are written, and read without trusting the file.
+"""Small values of an HDF5 file: written, and read without trusting the file.
 
-The HDF5 library believes what it reads. A damaged type, or the heap in which texts of variable
-length lie, can end the process or hold it for ever. So types are looked at before values, our own
-texts are of fixed length, and those of others are read by a process of their own.
+The HDF5 library trusts what it reads. A damaged type, or a damaged heap of texts of variable
+length, can end the process or block it for ever. Types are therefore checked before values, own
+texts have fixed length, and those of other programs are read in a separate process.
 """
 
 import json
@@ -36,35 +36,35 @@ HDF5_FAULTS = (
     NotImplementedError,
     MemoryError,
 )
-"""What h5py raises on damaged bytes."""
+"""Errors raised by h5py on damaged bytes."""
 
 Place = tuple[str, str]
 """Path of an object in the file, and name of its attribute."""
 
 
-def texts_apart(path: Path, places: Sequence[Place]) -> dict[Place, str]:
-    """Texts of variable length, read by another process, which alone dies of a damaged heap.
+def texts_by_subprocess(path: Path, places: Sequence[Place]) -> dict[Place, str]:
+    """Texts of variable length, read by another process, so that a damaged heap ends only that one.
 
     Parameters
     ----------
     path : Path
         File.
     places : sequence of tuple
-        Where they are; none costs nothing.
+        Attributes to read; if there are none, no process is started.
 
     Returns
     -------
     dict
-        By place; empty for what is no single text.
+        Texts by place; empty for anything but a single text.
 
     Raises
     ------
     ValueError
-        The process fails or does not come to an end.
+        If the process fails or does not end.
     """
     if not places:
         return {}
-    # -P: with -c, a json.py of the current folder would be run
+    # -P: with -c, a json.py in the current folder would be run
     command = [sys.executable, "-P", "-c", _READ_TEXTS, str(path)]
     try:
         done = subprocess.run(
@@ -89,9 +89,9 @@ def is_loose_text(attribute: Any) -> bool:
 
 
 def is_plain(kind: Any) -> bool:
-    """Whether values of a type (h5py.h5t.TypeID) lie where they are stored, heaps not needed.
+    """Whether values of a type (h5py.h5t.TypeID) are stored inline, without a heap.
 
-    Numbers, truth values, texts of fixed length, and rows of these.
+    This holds for numbers, truth values, texts of fixed length, and rows of these.
     """
     if isinstance(kind, h5py.h5t.TypeCompoundID):
         return all(is_plain(kind.get_member_type(i)) for i in range(kind.get_nmembers()))
@@ -101,14 +101,14 @@ def is_plain(kind: Any) -> bool:
 
 
 def plain_value(item: Any, key: str) -> Any:
-    """One number, or text of fixed length as bytes; None of anything else.
+    """One number, or a text of fixed length as bytes; None for anything else.
 
     Parameters
     ----------
     item : h5py.File, h5py.Group or h5py.Dataset
-        With the attribute.
+        Object with the attribute.
     key : str
-        Its name.
+        Name of the attribute.
     """
     if key not in item.attrs:
         return None
@@ -122,24 +122,24 @@ def plain_value(item: Any, key: str) -> Any:
 
 
 def plain_values(path: Path, item: Any, where: str = "/") -> dict[str, Any]:
-    """Every attribute of an object: numbers, and texts decoded.
+    """All attributes of an object: numbers, and texts decoded.
 
     Parameters
     ----------
     path : Path
         File.
     item : h5py.File, h5py.Group or h5py.Dataset
-        Open.
+        Open object.
     where : str
         Path of `item` in the file.
 
     Raises
     ------
     ValueError
-        One is neither a number nor a text.
+        If one is neither a number nor a text.
     """
     loose = [(where, key) for key in item.attrs if is_loose_text(item.attrs.get_id(key))]
-    texts = {key: text for (_, key), text in texts_apart(path, loose).items()}
+    texts = {key: text for (_, key), text in texts_by_subprocess(path, loose).items()}
     return {key: texts[key] if key in texts else _known_value(item, key) for key in item.attrs}
 
 
@@ -147,7 +147,7 @@ def _known_value(item: Any, key: str) -> Any:
     value = plain_value(item, key)
     if value is None:
         raise ValueError(f"attribute {key!r} must be one number or one text")
-    # a damaged text is for the hashes to find
+    # a damaged text is detected by the hashes
     return value.decode(errors="replace") if isinstance(value, bytes) else value
 
 
@@ -157,9 +157,9 @@ def write_values(item: Any, values: Mapping[str, Any]) -> None:
     Parameters
     ----------
     item : h5py.File, h5py.Group or h5py.Dataset
-        Writable.
+        Writable object.
     values : mapping
-        Numbers and texts; bytes are texts encoded already.
+        Numbers and texts; bytes are texts already encoded.
     """
     for name, value in values.items():
         if isinstance(value, (str, bytes)):
@@ -171,19 +171,19 @@ def write_values(item: Any, values: Mapping[str, Any]) -> None:
 
 
 def make_room(item: Any, name: str, n_bytes: int) -> None:
-    """An empty text attribute that can take so many bytes later, changing no structure.
+    """Create an empty text attribute that can be filled later without changing any structure.
 
     Parameters
     ----------
     item : h5py.File, h5py.Group or h5py.Dataset
-        Writable.
+        Writable object.
     name : str
-        Of the attribute; one that is there is replaced.
+        Name of the attribute; an existing one is replaced.
     n_bytes : int
         Longest text as UTF-8.
     """
     kind = h5py.h5t.C_S1.copy()
-    kind.set_size(n_bytes + 1)  # and the zero that ends it: readers show no padding
+    kind.set_size(n_bytes + 1)  # with its terminating zero, so that readers show no padding
     kind.set_strpad(h5py.h5t.STR_NULLTERM)
     kind.set_cset(h5py.h5t.CSET_UTF8)
     if name in item.attrs:
@@ -193,21 +193,21 @@ def make_room(item: Any, name: str, n_bytes: int) -> None:
 
 
 def fill_room(item: Any, name: str, raw: bytes) -> None:
-    """Write a text into the place made for it.
+    """Write a text into an attribute made by :func:`make_room`.
 
     Parameters
     ----------
     item : h5py.File, h5py.Group or h5py.Dataset
-        Writable.
+        Writable object.
     name : str
-        Of the attribute.
+        Name of the attribute.
     raw : bytes
         The text as UTF-8.
 
     Raises
     ------
     ValueError
-        The place is too small.
+        If the reserved length is too small.
     """
     attribute = item.attrs.get_id(name)
     kind = attribute.get_type()

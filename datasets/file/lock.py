@@ -1,4 +1,4 @@
-"""One run at a time writes an output; the others are told who does."""
+"""One run at a time writes an output; others get an error that names it."""
 
 import errno
 import json
@@ -14,10 +14,10 @@ from ...sim.output.recording import DataError
 
 try:
     import fcntl
-except ImportError:  # Windows: the file alone must do
+except ImportError:  # Windows: only the lock file is used
     fcntl = None  # type: ignore[assignment]
 
-_PATIENCE = 0.5  # s; in which a holder has written its name
+_PATIENCE = 0.5  # s; within which a holder has written its name
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL}
 
 
@@ -25,21 +25,21 @@ _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, err
 def holding(path: Path, say: Callable[[str], None] | None = None) -> Iterator[None]:
     """Keep other runs from writing an output until this one ends or dies.
 
-    A lock of the operating system on ``<path>.lock``, which a process that dies gives up. Where
-    the file system has none, ``<path>.pid`` is made instead; one left by a dead process of this
-    machine is taken over.
+    Uses a lock of the operating system on ``<path>.lock``, which is released if the process dies.
+    If the file system has no locks, ``<path>.pid`` is created instead; one left by a dead process
+    of this machine is taken over.
 
     Parameters
     ----------
     path : Path
         Output.
     say : callable, optional
-        Called with a line where the file system has no locks.
+        Called with a line if the file system has no locks.
 
     Raises
     ------
     DataError
-        Another run holds it, or the lock cannot be made.
+        If another run holds it, or the lock cannot be made.
 
     Examples
     --------
@@ -67,13 +67,13 @@ def holding(path: Path, say: Callable[[str], None] | None = None) -> Iterator[No
     try:
         yield
     finally:
-        with suppress(OSError):  # first the name, then the lock: who waits for it must look again
+        with suppress(OSError):  # first the name: whoever waits for the lock checks it again
             place.unlink()
         os.close(handle)
 
 
 def _locked(path: Path, place: Path) -> int | None:
-    """Descriptor of the lock file, locked; None where the file system has no locks."""
+    """Descriptor of the lock file, locked; None if the file system has no locks."""
     if fcntl is None:
         return None
     while True:
@@ -92,7 +92,7 @@ def _locked(path: Path, place: Path) -> int | None:
                 raise
             place.unlink(missing_ok=True)
             return None
-        os.close(handle)  # its holder removed it meanwhile
+        os.close(handle)  # its holder has removed it meanwhile
 
 
 def _same(handle: int, place: Path) -> bool:
@@ -103,7 +103,7 @@ def _same(handle: int, place: Path) -> bool:
 
 
 def _claimed(path: Path, place: Path) -> int:
-    """Descriptor of a file that says who holds the output, made by this process."""
+    """Descriptor of a file made by this process that names the holder of the output."""
     while True:
         try:
             handle = os.open(place, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
@@ -120,7 +120,7 @@ def _claimed(path: Path, place: Path) -> int:
 
 
 def _take_away(place: Path, holder: dict[str, str | int]) -> None:
-    """Remove the file of a dead process, not one that a third has made in its place meanwhile."""
+    """Remove the file of a dead process, but not one made meanwhile by a third process."""
     aside = fresh_name(place)
     with suppress(FileNotFoundError):
         os.rename(place, aside)
@@ -136,7 +136,7 @@ def _sign(handle: int) -> None:
 
 
 def _signed(place: Path) -> dict[str, str | int]:
-    """Who a lock file names; empty where it does not say so within `_PATIENCE`."""
+    """Holder named in a lock file; empty if it is not written within `_PATIENCE`."""
     end = time.monotonic() + _PATIENCE
     while True:
         with suppress(OSError, ValueError, KeyError, TypeError):

@@ -1,4 +1,4 @@
-"""Which machine a record is of, as far as its data set knows."""
+"""Machine of each record, as far as its data set identifies it."""
 
 import json
 from collections.abc import Sequence
@@ -16,19 +16,19 @@ _NO_NAMES = ("", ".")  # of a machine: the folder of a file that lies in none
 
 
 def machine_origin(recipe: str, seed: int) -> tuple[str, int] | None:
-    """What decides the machines of a simulated set: equal groups of equal origin are one machine.
+    """Origin of the machines of a simulated set: equal groups of equal origin are one machine.
 
     Parameters
     ----------
     recipe : str
-        TOML text of the data set's recipe; empty where none made it.
+        TOML text of the data set's recipe; empty if it has none.
     seed : int
-        Of the data set.
+        Seed of the data set.
 
     Returns
     -------
     tuple of (str, int) or None
-        Name of the recipe that draws the machines, as JSON, and seed; None of a measured set.
+        Name of the recipe that draws the machines, as JSON, and seed; None for a measured set.
 
     Examples
     --------
@@ -46,22 +46,22 @@ def machine_origin(recipe: str, seed: int) -> tuple[str, int] | None:
 
 
 def machine_identities(rows: NDArray[np.void], recipe: str, seed: int) -> tuple[str, ...]:
-    """Identity of the machine of each record: equal texts are one machine, in whatever file.
+    """Identity of the machine of each record: equal texts are one machine, in any file.
 
     Parameters
     ----------
     rows : numpy.ndarray [shape=(n_records,)]
         Manifest, structured as in the file.
     recipe : str
-        As of :func:`machine_origin`.
+        As for :func:`machine_origin`.
     seed : int
-        As of :func:`machine_origin`.
+        As for :func:`machine_origin`.
 
     Returns
     -------
     tuple of str
-        Draw of a recipe under a seed, or the name that an import was told. Empty where unknown:
-        a bare group number is none, nor is the name of a file, which any folder may hold.
+        Draw of a recipe under a seed, or the name given on import. Empty if unknown: a group number
+        alone is no identity, nor is the name of a file, since any folder may contain it.
 
     Examples
     --------

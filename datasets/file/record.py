@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 1
 
 LARGEST_RECORD = 2**31
-"""Largest believable record [byte]: 100 channels of 100 s at 50 kHz."""
+"""Largest plausible record [byte]: 100 channels of 100 s at 50 kHz."""
 
 HEAD = {
     "record_id": "S16",
@@ -45,7 +45,7 @@ TAIL = {"signal_crc32": "<u4"}
 
 @contextmanager
 def refusing(path: Path, what: str) -> Iterator[None]:
-    """Turn what h5py raises on damaged bytes into one message."""
+    """Turn h5py's errors on damaged bytes into one message."""
     try:
         yield
     except DataError:
@@ -59,7 +59,8 @@ def refusing(path: Path, what: str) -> Iterator[None]:
 class DataSet:
     """A data set file, open for reading.
 
-    Opens by path, once per process, so that it can be pickled and handed to loader workers.
+    The file is opened by path, once per process, so that the object can be pickled and passed to
+    loader workers.
 
     Parameters
     ----------
@@ -69,19 +70,19 @@ class DataSet:
     Attributes
     ----------
     attributes : Attributes
-        What holds for every record.
+        Properties common to all records.
     stored : dict
-        The same and the hashes, as numbers and texts by name in the file.
+        Attributes and hashes, as numbers and texts by name in the file.
     rows : numpy.ndarray [shape=(n_records,)]
         Labels, conditions and numerics, structured as in the file.
     unhashed : tuple of str
-        Those of `HASHES` that the file lacks: one made before there were hashes.
+        Members of `HASHES` missing in the file, which was made before there were hashes.
 
     Raises
     ------
     DataError
-        There is no such file, it is unfinished (``.part``), truncated, damaged or altered, of
-        another program, or of another schema version.
+        If the file does not exist, is unfinished (``.part``), truncated, damaged or altered, was
+        made by another program, or has another schema version.
 
     Examples
     --------
@@ -119,7 +120,7 @@ class DataSet:
         return f"<DataSet {self.path.name}, {', '.join(self._facts)}>"
 
     def _repr_html_(self) -> str:
-        """For notebooks: the same and the first rows of the manifest."""
+        """HTML for notebooks: the same and the first rows of the manifest."""
         head = self.manifest.iloc[:5]
         rows = [tuple(row) for row in head.itertuples(index=False)]
         return html_table(f"{self.path.name}, {', '.join(self._facts)}", list(head.columns), rows)
@@ -134,7 +135,7 @@ class DataSet:
 
     @cached_property
     def manifest(self) -> "pd.DataFrame":
-        """The rows as a table with texts decoded; made when first asked for."""
+        """Rows as a table with texts decoded; computed on first use."""
         with refusing(self.path, "manifest"):
             return _decoded(self.rows)
 
@@ -150,9 +151,9 @@ class DataSet:
         Raises
         ------
         IndexError
-            `index` is not below the number of records.
+            If `index` is not below the number of records.
         DataError
-            The stored signal is damaged or not finite.
+            If the stored signal is damaged or not finite.
         """
         number = self._number(index)
         signal = self.stored_signal(number)
@@ -172,7 +173,7 @@ class DataSet:
         )
 
     def _refuse_damaged(self, number: int, signal: NDArray[np.float32]) -> None:
-        """Look at the checksum of a record when it is read first; it is most of the time then."""
+        """Check the checksum of a record on its first read, since it takes most of the time."""
         if self._intact[number]:
             return
         found, wanted = signal_checksum(signal), int(self.rows["signal_crc32"][number])
@@ -195,23 +196,23 @@ class DataSet:
         Raises
         ------
         IndexError
-            `index` is not below the number of records.
+            If `index` is not below the number of records.
         DataError
-            They are damaged.
+            If they are damaged.
         """
         number = self._number(index)
         with refusing(self.path, f"record {number}"):
             return _plain_row(self.rows[number])
 
     def stored_signal(self, index: int) -> NDArray[np.float32]:
-        """Signal of one record as the file holds it, its checksum not looked at.
+        """Signal of one record as stored, without a check of its checksum.
 
         Raises
         ------
         IndexError
-            `index` is not below the number of records.
+            If `index` is not below the number of records.
         DataError
-            It cannot be read.
+            If it cannot be read.
         """
         number = self._number(index)
         with refusing(self.path, f"record {number}"):
@@ -219,14 +220,14 @@ class DataSet:
             return signal
 
     def truth(self, index: int) -> dict[str, NDArray[np.float32]]:
-        """Hidden quantities of one record, by name; empty where none are stored.
+        """Hidden quantities of one record, by name; empty if none are stored.
 
         Raises
         ------
         IndexError
-            `index` is not below the number of records.
+            If `index` is not below the number of records.
         DataError
-            They are damaged.
+            If they are damaged.
         """
         number = self._number(index)
         with refusing(self.path, f"truth of record {number}"):
@@ -235,12 +236,12 @@ class DataSet:
 
     @cached_property
     def splits(self) -> dict[str, dict[str, Any]]:
-        """How each stored split was made, by name: ``kind``, ``text``, ``machines_apart`` and more.
+        """Description of each stored split by name: ``kind``, ``text``, ``machines_apart``, ….
 
         Raises
         ------
         DataError
-            They are damaged.
+            If they are damaged.
         """
         with refusing(self.path, "splits"):
             stored = self._handle().get("splits", {})
@@ -266,7 +267,7 @@ class DataSet:
         Raises
         ------
         DataError
-            There is no such split, or it is damaged.
+            If there is no such split, or it is damaged.
         """
         if name not in self.splits:
             raise DataError(
@@ -297,7 +298,7 @@ class DataSet:
         return self._file
 
     def _signal(self) -> Any:
-        # looked up once: by name takes as long as a third of reading a second of signal
+        # cached: a look-up by name takes a third of the time of reading a second of signal
         file = self._handle()
         if self._signals is None:
             self._signals = file["signal"]
@@ -333,13 +334,13 @@ def _refuse_by_name(path: Path) -> None:
         raise DataError(missing_file(path, cure))
     if path.suffix.lower() not in (".h5", ".hdf5") and not h5py.is_hdf5(path):
         raise DataError(
-            f"{path} is no data set; make one of measured files: wearstate import {path.name} -o "
-            "data.h5, with their units"
+            f"{path} is not a data set; make one of measured files: wearstate import {path.name} "
+            "-o data.h5, with their units"
         )
 
 
 def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
-    # of a foreign file nothing else is read
+    # nothing else is read of a foreign file
     stored = plain_values(path, file) if "created_by" in file.attrs else {}
     if not str(stored.get("created_by", "")).startswith("wearstate "):
         raise DataError(
@@ -394,7 +395,7 @@ def _check_storage(dataset: Any, path: Path) -> None:
 
 
 def _table(text: str) -> dict[str, Any]:
-    """A JSON table; anything else is damage."""
+    """A JSON table; anything else is refused as damage."""
     found = json.loads(text)
     if not isinstance(found, dict):
         raise ValueError(f"{short_text(found)} must be a table")
@@ -411,7 +412,7 @@ def refuse_unfinished(done: NDArray[np.bool_], path: Path) -> None:
 
 
 def _plain_row(row: np.void) -> dict[str, Any]:
-    """Manifest values of one record, as Python has them."""
+    """Manifest values of one record, as Python objects."""
     return {
         name: value.decode() if isinstance(value, bytes) else value
         for name, value in zip(row.dtype.names or (), row.item(), strict=True)
@@ -419,7 +420,7 @@ def _plain_row(row: np.void) -> dict[str, Any]:
 
 
 def _decoded(rows: NDArray[np.void]) -> "pd.DataFrame":
-    import pandas as pd  # a quarter of a second, which processes that simulate do not need
+    import pandas as pd  # takes a quarter of a second; not needed by processes that simulate
 
     columns = {}
     for name in rows.dtype.names or ():
@@ -434,17 +435,17 @@ def part_of(path: Path) -> Path:
 
 
 def unfinished_attributes(path: str | Path) -> Attributes | None:
-    """What an unfinished file of a data set says of itself; None where there is none.
+    """Attributes of a data set's unfinished file; None if there is none.
 
     Parameters
     ----------
     path : str or Path
-        Of the finished file.
+        Path of the finished file.
 
     Raises
     ------
     DataError
-        The unfinished file cannot be read.
+        If the unfinished file cannot be read.
     """
     part = part_of(Path(path).absolute())
     if not part.is_file():
@@ -454,6 +455,6 @@ def unfinished_attributes(path: str | Path) -> Attributes | None:
 
 
 def short_text(value: Any) -> str:
-    """A value for a message, 60 characters at most."""
+    """Text of a value for a message, 60 characters at most."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}…"

@@ -1,7 +1,7 @@
-"""Several tests of one machine state, each in a data set of its own, put together as one record.
+"""Several tests of one machine state, each in its own data set, joined to one record.
 
 A view is one of these tests: the machine running, a shaker at one bearing, the same at another.
-Records of two sets belong together where machine and state are the same.
+Records of two sets belong together if machine and state are the same.
 """
 
 from collections import Counter
@@ -19,10 +19,10 @@ from .attributes import Attributes
 from .record import DataSet
 
 VIEW, STATE = "view", "state"
-"""Manifest columns: which test a record is, and of which state of its machine."""
+"""Manifest columns: the test that a record belongs to, and the state of its machine."""
 
 MARK = ":"
-"""Between the name of a view and that of a feature."""
+"""Separator between the name of a view and that of a feature."""
 
 
 @dataclass(frozen=True, order=True)
@@ -32,7 +32,7 @@ class CompletingView:
     Attributes
     ----------
     name : str
-        What its features are called by.
+        Prefix of the names of its features.
     path : Path
     """
 
@@ -40,17 +40,18 @@ class CompletingView:
     path: Path
 
     @classmethod
-    def told(cls, text: str) -> Self:
-        """A view from ``NAME=FILE`` or ``FILE``, whose manifest or file name names the view.
+    def from_text(cls, text: str) -> Self:
+        """View from ``NAME=FILE`` or ``FILE``; without a name, manifest or file name gives it.
 
         Raises
         ------
         DataError
-            The file is no data set, it holds several views, or the name has a mark of ours.
+            If the file is not a data set, holds several views, or the name has a reserved
+            character.
 
         Examples
         --------
-        >>> CompletingView.told("running=turning.h5").name
+        >>> CompletingView.from_text("running=turning.h5").name
         'running'
         """
         name, sign, file = text.partition("=")
@@ -76,14 +77,14 @@ def _name_in(path: Path) -> str:
 
 
 def views_of(texts: Sequence[str]) -> tuple[CompletingView, ...]:
-    """Views as a command line tells them; see :meth:`View.told`.
+    """Views given on the command line; see :meth:`CompletingView.from_text`.
 
     Raises
     ------
     DataError
-        Two have the same name.
+        If two have the same name.
     """
-    found = tuple(CompletingView.told(text) for text in texts)
+    found = tuple(CompletingView.from_text(text) for text in texts)
     twice = [name for name, count in Counter(view.name for view in found).items() if count > 1]
     if twice:
         raise DataError(f"views named {', '.join(twice)} are given twice; name them: NAME=FILE")
@@ -91,7 +92,7 @@ def views_of(texts: Sequence[str]) -> tuple[CompletingView, ...]:
 
 
 def _texts(data: DataSet, column: str) -> list[str]:
-    """A manifest column as texts; empty where there is none."""
+    """A manifest column as texts; empty if there is none."""
     if column not in (data.rows.dtype.names or ()):
         return []
     return [str(value) for value in data.manifest[column].tolist()]
@@ -103,11 +104,11 @@ def _keys(data: DataSet) -> list[tuple[str, str]]:
     Raises
     ------
     DataError
-        The set does not tell them.
+        If the set does not name them.
     """
     states = _texts(data, STATE)
     if not states and data.attributes.recipe:
-        states = _texts(data, "record_id")  # record i of every view is of the same state
+        states = _texts(data, "record_id")  # record i of every view has the same state
     if not states or "" in states or "" in data.machines:
         raise DataError(
             f"{data.path}: its records do not name machine and state, which joining needs; import "
@@ -118,19 +119,19 @@ def _keys(data: DataSet) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class JoinedSet:
-    """A data set whose records carry those of its views.
+    """A data set whose records include those of its views.
 
     Attributes
     ----------
     path : Path
         The data set; its manifest is that of the whole.
     views : tuple of CompletingView
-        May be none.
+        Views to join; may be empty.
 
     Raises
     ------
     DataError
-        On first use: a set cannot be read, does not tell machine and state, or has two usable
+        On first use: if a set cannot be read, does not name machine and state, or has two usable
         records of one state.
     """
 
@@ -144,7 +145,7 @@ class JoinedSet:
 
     @cached_property
     def _others(self) -> dict[str, tuple[DataSet, NDArray[np.intp]]]:
-        """Of each view its set, and the number in it of each record here; -1 where it has none."""
+        """Data set of each view, and its record number for each record here; -1 if it has none."""
         if not self.views:
             return {}
         sets = {view.name: DataSet(view.path) for view in self.views}
@@ -174,7 +175,7 @@ class JoinedSet:
 
     @property
     def layouts(self) -> dict[str, Attributes]:
-        """What holds for all records of each view."""
+        """Properties common to all records of each view."""
         return {name: other.attributes for name, (other, _) in self._others.items()}
 
     @cached_property
@@ -184,7 +185,7 @@ class JoinedSet:
         return np.asarray(np.all([np.ones(len(self.data), dtype=bool), *here], axis=0))
 
     def lacks(self, view: str) -> NDArray[np.bool_]:
-        """Which records have no usable one in a view [shape=(n_records,)]."""
+        """Whether a record has no usable counterpart in a view [shape=(n_records,)]."""
         return np.asarray(self._others[view][1] < 0)
 
     @cached_property
@@ -194,7 +195,7 @@ class JoinedSet:
         return tuple(name for name in self._others if (usable & self.lacks(name)).any())
 
     def __getitem__(self, index: int) -> Recording:
-        """A record with those of its views; one that is missing is not in it."""
+        """A record with those of its views; missing ones are left out."""
         joined = {
             name: other[int(places[index])]
             for name, (other, places) in self._others.items()
@@ -216,7 +217,7 @@ class JoinedSet:
 
 
 def _places(other: DataSet, wanted: Sequence[tuple[str, str]]) -> NDArray[np.intp]:
-    """Number in a set of the usable record of each machine and state; -1 where there is none."""
+    """Number in a set of the usable record of each machine and state; -1 if there is none."""
     usable = (other.manifest["status"] == "ok").to_numpy()
     keys = [key for key, sound in zip(_keys(other), usable, strict=True) if sound]
     if len(set(keys)) < len(keys):
@@ -229,13 +230,13 @@ def _places(other: DataSet, wanted: Sequence[tuple[str, str]]) -> NDArray[np.int
 
 
 def joined_recordings(recording: Recording, others: Mapping[str, Recording]) -> Recording:
-    """A recording with further tests of the same machine state, as its reader says.
+    """A recording with further tests of the same machine state.
 
     Parameters
     ----------
     recording : Recording
     others : mapping
-        Name of the view -> recording.
+        Recordings by name of the view.
 
     Returns
     -------
@@ -244,7 +245,7 @@ def joined_recordings(recording: Recording, others: Mapping[str, Recording]) -> 
     Raises
     ------
     DataError
-        One is known to be of another machine or state.
+        If one is known to be of another machine or state.
     """
     for name, other in others.items():
         machines = (recording.machine, other.machine)
@@ -259,7 +260,7 @@ def joined_recordings(recording: Recording, others: Mapping[str, Recording]) -> 
 
 
 def layout_card(head: Attributes) -> dict[str, Any]:
-    """What a recording must have to be of a layout, as plain values."""
+    """Properties that a recording must have to match a layout, as plain values."""
     return {
         "channels": [dict(vars(channel)) for channel in head.channels],
         "sample_rate_hz": head.sample_rate,

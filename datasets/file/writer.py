@@ -1,4 +1,4 @@
-"""Writing of a data set file: laid out once, filled record by record, gone on with after a stop."""
+"""Writing of a data set file: laid out once, filled record by record, resumed after a stop."""
 
 import json
 import math
@@ -26,11 +26,11 @@ _UNKNOWN: dict[str, Any] = {"S": b"", "i": -1, "u": 0, "b": False, "f": float("n
 
 
 class WriteError(RuntimeError):
-    """A data set file cannot be written on; names file, cause and cure. What is in it stays."""
+    """A data set file cannot be written further; names file, cause and cure. Its content stays."""
 
 
 def _file_attributes(attributes: Attributes) -> dict[str, Any]:
-    """Names and values as the file holds them."""
+    """Names and values as stored in the file."""
     return {
         "schema_version": SCHEMA_VERSION,
         "origin": attributes.origin,
@@ -50,7 +50,7 @@ def _file_attributes(attributes: Attributes) -> dict[str, Any]:
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
-    """What tells a file from another of its name; None where there is none."""
+    """Identity of a file, to distinguish it from another of the same name; None without a file."""
     try:
         found = path.stat()
     except FileNotFoundError:
@@ -59,41 +59,41 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 class LostError(WriteError):
-    """The file being written is not where it was; the text says what became of its records."""
+    """The file being written is no longer in its place; the text gives the fate of its records."""
 
 
 class DataSetWriter:
-    """Writes a data set file, record by record, so that a killed run can go on.
+    """Writes a data set file record by record, so that an interrupted run can be resumed.
 
-    All space is taken before the first record, in ``<path>.part``; from then on only bytes inside
-    it change, first the signal, then its manifest row with ``done``. `finish` renames. A run that
-    is killed loses the records in flight. A checksum per record finds those that a power cut has
-    lost; they are written again. Hidden quantities tell their shapes with the first record that
-    has any: the file is then laid out anew beside itself, once.
+    All space is reserved before the first record, in ``<path>.part``; afterwards only bytes inside
+    it change, first the signal, then its manifest row with ``done``. `finish` renames the file. A
+    killed run loses the records in flight. A checksum per record finds those lost by a power
+    failure; they are written again. The shapes of hidden quantities are known from the first record
+    that has any: the file is then laid out again in a second file, once.
 
     Parameters
     ----------
     path : str or Path
         File to write.
     attributes : Attributes
-        What holds for every record.
+        Properties common to all records.
     n_records, n_samples : int
         Both >= 1.
     columns : mapping
-        Further manifest columns: name -> numpy type, in order.
+        Further manifest columns with their numpy types, in order.
     splits : sequence of str
         Names of the splits that may be written.
     force : bool
-        Replace an existing file, and start an unfinished one anew.
+        Replace an existing file, and restart an unfinished one.
     resumable : bool
-        False: the unfinished file has a name of its own and goes where the run fails; one that
-        another run left stays.
+        If False, the unfinished file has a unique name and is deleted if the run fails; one left by
+        another run stays.
 
     Raises
     ------
     DataError
-        The file exists, the folder does not or has no room or may not be written, or an
-        unfinished file is of another run, or is being written. Nothing is left behind.
+        If the file exists, the folder does not, has no room or is not writable, or an unfinished
+        file belongs to another run or is being written. Nothing is left behind.
 
     Examples
     --------
@@ -141,14 +141,14 @@ class DataSetWriter:
         self._resume()
 
     def _lay_out(self, truth: Mapping[str, tuple[int, ...]] | None = None) -> None:
-        """Make the empty ``.part`` under another name first: it is whole or it is not there."""
+        """Create the empty ``.part`` under another name first, so that it is complete or absent."""
         hidden = sum(math.prod(shape) for shape in (truth or {}).values())
         _refuse_size(self._shape, self._dtype, hidden, self.path.parent)
         fresh = fresh_name(self.path)
         try:
             with _laying_out(self.path), h5py.File(fresh, "w") as file:
                 empty = np.zeros(0, dtype=self._dtype)
-                # both hashes in place from the start, so that finishing changes no structure
+                # both hashes exist from the start, so that finishing changes no structure
                 write_values(file, stamped(_file_attributes(self.attributes), empty))
                 _create(file, "signal", self._shape, np.dtype(np.float32), chunk=True)
                 _create(file, "manifest", self._shape[:1], self._dtype, chunk=False)
@@ -166,7 +166,7 @@ class DataSetWriter:
             raise
 
     def _copy_done(self, file: Any) -> None:
-        """Take over what the file at hand holds, when it is laid out anew."""
+        """Copy the records of the present file into the newly laid out one."""
         if self._file is None:
             return
         hidden = [f"truth/{name}" for name in self._file.get("truth", {})]
@@ -205,7 +205,7 @@ class DataSetWriter:
             )
 
     def _intact(self) -> NDArray[np.bool_]:
-        """Which records are done and still fit their checksum [shape=(n_records,)]."""
+        """Whether each record is done and matches its checksum [shape=(n_records,)]."""
         rows = self.manifest()
         done = np.array(rows["done"], dtype=bool)
         for index in np.flatnonzero(done):
@@ -229,18 +229,18 @@ class DataSetWriter:
         signal : numpy.ndarray [shape=(n_channels, n_samples)]
             Stored as float32.
         row : mapping
-            Manifest values by column; a column left out is NaN, -1 or empty.
+            Manifest values by column; a missing column becomes NaN, -1 or empty.
         truth : mapping, optional
             Hidden quantities, the same names and shapes in every record; stored as float32.
 
         Raises
         ------
         DataError
-            Signal or row do not fit the file, or a sample is not finite.
+            If signal or row do not fit the file, or a sample is not finite.
         WriteError
-            The disk is full or failing. The records marked done are whole.
+            If the disk is full or failing. The records marked done are complete.
         LostError
-            The unfinished file is not in its place any more.
+            If the unfinished file is no longer in its place.
         """
         self.refuse_lost()
         samples = np.ascontiguousarray(signal, dtype=np.float32)
@@ -262,14 +262,14 @@ class DataSetWriter:
             _write_chunk(self._signal, index, samples)
             for name, array in (truth or {}).items():
                 _write_chunk(self._file[f"truth/{name}"], index, array)
-            # a row that says done must never precede its signal
+            # a row marked done must never precede its signal
             self._file.flush()
             self._manifest[index] = filled
             self._file.flush()
         self.done[index] = True
 
     def _make_place(self, truth: Mapping[str, NDArray[Any]]) -> None:
-        """Place for hidden quantities, in a new file: a structure half changed cannot be read."""
+        """Create datasets for hidden quantities in a new file; a half-changed one is unreadable."""
         there = self._file.get("truth", {})
         if all(name in there for name in truth):
             return
@@ -279,12 +279,12 @@ class DataSetWriter:
         self._resume()
 
     def refuse_lost(self) -> None:
-        """Refuse to go on where the unfinished file is not in its place any more.
+        """Refuse to continue if the unfinished file is no longer in its place.
 
         Raises
         ------
         LostError
-            It was deleted, moved or replaced.
+            If it was deleted, moved or replaced.
         """
         if _identity(self.part) != self._identity:
             written = np.count_nonzero(self.done)
@@ -295,39 +295,39 @@ class DataSetWriter:
             )
 
     def manifest(self) -> NDArray[np.void]:
-        """Manifest rows as they stand [shape=(n_records,)]."""
+        """Manifest rows in their present state [shape=(n_records,)]."""
         rows: NDArray[np.void] = self._manifest[:]
         return rows
 
     def write_split(self, name: str, sides: NDArray[np.int8], about: str) -> None:
-        """Write a split that place was laid out for.
+        """Write a split that was laid out at the start.
 
         Parameters
         ----------
         name : str
-            Of the split.
+            Name of the split.
         sides : numpy.ndarray [shape=(n_records,)]
             0 train, 1 test, -1 neither.
         about : str
-            How it was made, as JSON.
+            Description of the split, as JSON.
         """
-        if f"splits/{name}" not in self._file:  # in one begun before there were splits
+        if f"splits/{name}" not in self._file:  # in a file begun before there were splits
             lay_out_split(self._file, name, self._shape[0])
         fill_split(self._file, name, sides, about)
 
     def finish(self) -> None:
-        """Close the file and give it its name.
+        """Close the file and give it its final name.
 
         Raises
         ------
         DataError
-            Not every record is done.
+            If not every record is done.
         WriteError
-            The disk is full or failing; the unfinished file stays.
+            If the disk is full or failing; the unfinished file stays.
         LostError
-            The unfinished file is not in its place any more.
+            If the unfinished file is no longer in its place.
         OutputError
-            A file of its name appeared meanwhile; the unfinished file stays.
+            If a file of that name has appeared meanwhile; the unfinished file stays.
         """
         self.refuse_lost()
         refuse_unfinished(self.done, self.part)
@@ -336,7 +336,7 @@ class DataSetWriter:
 
     def _seal(self) -> None:
         hashed = manifest_hash(self.manifest()).encode()
-        if "manifest_sha256" in self._file.attrs:  # not in one begun before there were hashes
+        if "manifest_sha256" in self._file.attrs:  # not in a file begun before there were hashes
             fill_room(self._file, "manifest_sha256", hashed)
         self.close()
         put_in_place(self.part, self.path, force=self._force)
@@ -351,16 +351,16 @@ class DataSetWriter:
         return self
 
     def __exit__(self, _kind: object, error: object, _trace: object) -> None:
-        whole = error is None or isinstance(error, OutputError)  # whose text says where it is
+        whole = error is None or isinstance(error, OutputError)  # names the complete file
         try:
             self.close()
-        except (OSError, RuntimeError):  # the disk is still full: the first error tells it
+        except (OSError, RuntimeError):  # the disk is still full: the first error is reported
             if error is None:
                 whole = False
                 raise
         finally:
             if not (whole or self._resumable):
-                self.part.unlink(missing_ok=True)  # made anew, not gone on with
+                self.part.unlink(missing_ok=True)  # laid out again, not resumed
 
 
 def refuse_output(path: Path, force: bool) -> None:
@@ -369,19 +369,19 @@ def refuse_output(path: Path, force: bool) -> None:
     Parameters
     ----------
     path : Path
-        Absolute.
+        Absolute path.
     force : bool
-        It may be replaced.
+        Whether it may be replaced.
 
     Raises
     ------
     DataError
-        Its name ends in ``.part``, it is a folder or in none, or it exists.
+        If its name ends in ``.part``, it is a folder or in none, or it exists.
     """
     if path.suffix == ".part":
         raise DataError(f"{path}: the name must not end in .part, kept for unfinished files")
     if not path.parent.is_dir():
-        raise DataError(f"{path.parent} is no folder; create it")
+        raise DataError(f"{path.parent} is not a folder; create it")
     if path.is_dir():
         raise DataError(f"{path} is a folder; name a file in it")
     if path.exists() and not force:
@@ -389,10 +389,10 @@ def refuse_output(path: Path, force: bool) -> None:
 
 
 def _opened(part: Path) -> Any:
-    """Open for writing without HDF5's buffer: what a full disk refuses must fail at once.
+    """Open for writing without HDF5's buffer, so that a full disk raises an error at once.
 
-    HDF5 keeps what it could not write, fails over it again on closing, and ends the process with a
-    fault of memory.
+    HDF5 keeps what it could not write, fails again on closing, and ends the process with a memory
+    fault.
     """
     access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
     access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
@@ -401,7 +401,7 @@ def _opened(part: Path) -> Any:
 
 
 def _write_chunk(dataset: Any, index: int, values: NDArray[Any]) -> None:
-    """Write a record's chunk as it is: no cache, no selection, a third of the time."""
+    """Write a record's chunk directly: without cache and selection, in a third of the time."""
     chunk = np.asarray(values, dtype=np.float32, order="C")
     if chunk.shape != dataset.shape[1:]:
         raise DataError(
@@ -412,7 +412,7 @@ def _write_chunk(dataset: Any, index: int, values: NDArray[Any]) -> None:
 
 
 def _refuse_busy(part: Path) -> None:
-    """Refuse a file that another run is writing: it must not be taken from under it."""
+    """Refuse a file that another run is writing."""
     if not part.exists():
         return
     try:
@@ -424,20 +424,20 @@ def _refuse_busy(part: Path) -> None:
 
 @contextmanager
 def _writing(path: Path) -> Iterator[None]:
-    """Turn what the disk says into one message."""
+    """Turn write errors into one message."""
     try:
         yield
     except WriteError:
         raise
     except (OSError, RuntimeError) as error:
         raise WriteError(
-            f"{path} cannot be written ({_cause(error)}); mend the disk or make room"
+            f"{path} cannot be written ({_cause(error)}); repair the disk or make room"
         ) from error
 
 
 @contextmanager
 def _laying_out(path: Path) -> Iterator[None]:
-    """The same for a file that is not there yet: another place will do."""
+    """The same for a file that does not exist yet, whose cure is another place."""
     try:
         yield
     except (OSError, RuntimeError) as error:
@@ -448,19 +448,19 @@ def _laying_out(path: Path) -> Iterator[None]:
 
 
 def _cause(error: Exception) -> str:
-    """What the operating system said, without what HDF5 wraps around it."""
+    """Message of the operating system, without HDF5's text around it."""
     at: BaseException | None = error
-    while at is not None:  # closing fails after writing has, and says less
-        if told := re.search("error message = '([^']*)'", str(at)):
-            return told[1]
+    while at is not None:  # the error on closing follows the one on writing, and says less
+        if found := re.search("error message = '([^']*)'", str(at)):
+            return found[1]
         at = at.__context__
     return getattr(error, "strerror", None) or str(error)
 
 
 def _take_space(path: Path) -> None:
-    """Claim the disk for all that will be written: HDF5 leaves holes, a full disk cannot fill them.
+    """Reserve the disk space of all later writes: HDF5 leaves holes, which a full disk cannot fill.
 
-    A file system that copies on write, or a system without the call, can still run full.
+    On a copy-on-write file system, or a system without this call, the disk can still run full.
     """
     if hasattr(os, "posix_fallocate"):
         with path.open("r+b") as handle:
@@ -482,7 +482,7 @@ def _refuse_size(
 
 
 def size_words(count: int) -> str:
-    """Bytes for people.
+    """Number of bytes in readable units.
 
     Examples
     --------
@@ -497,10 +497,10 @@ def size_words(count: int) -> str:
 def _create(
     file: Any, name: str, shape: tuple[int, ...], dtype: np.dtype[Any], *, chunk: bool
 ) -> None:
-    """Create a dataset with all its space, so that later writes touch no structure."""
+    """Create a dataset with all its space, so that later writes change no structure."""
     plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plan.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    plan.set_obj_track_times(False)  # the same data, the same bytes
+    plan.set_obj_track_times(False)  # the same data give the same bytes
     if chunk:
         plan.set_chunk((1, *shape[1:]))
         plan.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
@@ -513,16 +513,16 @@ def _create(
 
 
 def lay_out_split(file: Any, name: str, n_records: int) -> None:
-    """Make place for a split, so that filling it changes no structure; until then it has no sides.
+    """Reserve space for a split, so that filling it changes no structure; it has no sides yet.
 
     Parameters
     ----------
     file : h5py.File
-        Of a data set, writable.
+        Data set file, writable.
     name : str
-        Of the split; one that is there is replaced.
+        Name of the split; an existing one is replaced.
     n_records : int
-        Records of the file.
+        Number of records of the file.
     """
     key = f"splits/{name}"
     if key in file:
@@ -533,23 +533,23 @@ def lay_out_split(file: Any, name: str, n_records: int) -> None:
 
 
 def fill_split(file: Any, name: str, sides: NDArray[np.int8], about: str) -> None:
-    """Write a split into the place laid out for it.
+    """Write a split into the space reserved for it.
 
     Parameters
     ----------
     file : h5py.File
-        Of a data set, writable.
+        Data set file, writable.
     name : str
-        Of the split.
+        Name of the split.
     sides : numpy.ndarray [shape=(n_records,)]
         0 train, 1 test, -1 neither.
     about : str
-        How it was made, as JSON.
+        Description of the split, as JSON.
 
     Raises
     ------
     DataError
-        The text is too long.
+        If the text is too long.
     """
     text = about.encode()
     if len(text) > _LONGEST_SPLIT:
@@ -562,7 +562,7 @@ def fill_split(file: Any, name: str, sides: NDArray[np.int8], about: str) -> Non
 
 
 def _filled(dtype: np.dtype[Any], values: Mapping[str, Any], index: int) -> NDArray[np.void]:
-    """One manifest row; refuses unknown columns and texts that would be cut."""
+    """One manifest row; refuses unknown columns and texts that would be truncated."""
     unknown = sorted(set(values) - set(dtype.names or ()))
     if unknown:
         raise DataError(f"row of record {index} has unknown columns {unknown}; declare them")
@@ -580,4 +580,4 @@ def _filled(dtype: np.dtype[Any], values: Mapping[str, Any], index: int) -> NDAr
 
 
 def _same(found: Any, wanted: Any) -> bool:
-    return bool(found == wanted) or (found != found and wanted != wanted)  # NaN fits NaN
+    return bool(found == wanted) or (found != found and wanted != wanted)  # NaN equals NaN here

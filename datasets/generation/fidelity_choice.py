@@ -1,7 +1,7 @@
-"""The least model for a whole data set: chosen once, on drawn records, before the first is made.
+"""Cheapest sufficient models for a data set, chosen once on drawn records before the first is made.
 
-What wears and what confounds pins the effect it acts on: a rung that does not know the clearance
-that a data set is about may not be chosen, however well it does on average.
+A severity or confounder pins the effect it acts on: a rung that ignores the clearance that a data
+set is about must not be chosen, however good it is on average.
 """
 
 import json
@@ -29,33 +29,33 @@ ACTS_ON = {
     "bearings": "film",
     "film": "film",
 }
-"""Table of a scene -> effect whose rungs know what is in it, of one throw or of all."""
+"""Effect by table of the scene: its rungs take that table into account, for one throw or all."""
 
-_SAMPLED = 64  # records whose step limits are looked at
+_SAMPLED = 64  # records whose step limits are checked
 
 
 @dataclass(frozen=True, kw_only=True)
 class FidelityChoice:
-    """What was chosen for a data set.
+    """Models chosen for a data set.
 
     Attributes
     ----------
     values : mapping of str to object
-        Dotted path of the scene -> value.
+        Values by dotted path of the scene.
     rungs : mapping of str to str
-        Effect -> its rung.
+        Rung by effect.
     pinned : tuple of str
-        Effects that stay as they are written.
+        Effects that stay as written.
     accuracy : float
-        That was asked [-].
+        Accuracy required [-].
     estimated_error : float
-        Largest of the pilots' [-].
+        Largest estimate of the pilots [-].
     status : str
-        As of :class:`~wearstate.sim.fidelity.choose.Resolution`; the worst of the pilots'.
+        As in :class:`~wearstate.sim.fidelity.choose.Resolution`; the worst of the pilots'.
     cost, cost_of_reference, cost_as_written : float
-        Tabulated, of one record [s].
+        Tabulated cost of one record [s].
     runs : int
-        Simulations that the choice took.
+        Number of simulations needed for the choice.
     """
 
     values: Mapping[str, Any]
@@ -71,7 +71,7 @@ class FidelityChoice:
 
     @property
     def text(self) -> str:
-        """What was chosen and what it saves, in one line."""
+        """The choice and its savings, in one line."""
         chosen = ", ".join(f"{effect} {rung}" for effect, rung in self.rungs.items()) or "nothing"
         kept = f" ({', '.join(self.pinned)} as written)" if self.pinned else ""
         return (
@@ -81,7 +81,7 @@ class FidelityChoice:
 
     @property
     def saved(self) -> str:
-        """Cost against that of the best rungs and of what is written, in words."""
+        """Cost relative to the best rungs and to those written, in words."""
         best, written = self.cost_of_reference / self.cost, self.cost_as_written / self.cost
         more = "as cheap as" if written > 1 else "the cost of"
         factor = written if written > 1 else 1 / written
@@ -91,7 +91,7 @@ class FidelityChoice:
         )
 
     def dump(self) -> str:
-        """As JSON, for the file."""
+        """The choice as JSON, for the file."""
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
@@ -102,7 +102,7 @@ class FidelityChoice:
 
 
 def pinned_by(recipe: Recipe) -> tuple[str, ...]:
-    """Effects that a recipe needs as they are written.
+    """Effects that a recipe needs as written.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def pinned_by(recipe: Recipe) -> tuple[str, ...]:
     -------
     tuple of str
         Those that a severity or a confounder acts on, those whose rung the recipe fixes or draws,
-        and those that the scene pins.
+        and those pinned by the scene.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def pinned_by(recipe: Recipe) -> tuple[str, ...]:
 
 
 def _acted_on(path: str) -> Iterator[str]:
-    """Effects whose tables a value is in."""
+    """Effects whose tables contain a value."""
     keys = path.split(".")
     inner = ".".join(keys[2:] if keys[0] == "throws" else keys)
     return (effect for table, effect in ACTS_ON.items() if f"{inner}.".startswith(f"{table}."))
@@ -150,15 +150,15 @@ def choose(
     accuracy: float | None = None,
     say: Callable[[str], None] | None = None,
 ) -> FidelityChoice:
-    """The cheapest rungs and numerics that do for the records of a recipe.
+    """The cheapest rungs and numerics that suffice for the records of a recipe.
 
     Parameters
     ----------
     recipe : Recipe
     seed : int
-        Of the data set, which decides the pilots.
+        Seed of the data set, which determines the pilots.
     accuracy : float, optional
-        The scene's own by default.
+        Accuracy [-]; by default that of the scene.
     say : callable, optional
         Called with a line about every pilot.
 
@@ -170,13 +170,13 @@ def choose(
     Raises
     ------
     SceneError
-        The reference of a pilot cannot be run.
+        If the reference of a pilot cannot be run.
 
     Notes
     -----
-    Pilots are the records of least and greatest primary severity among the first sixteen, which
-    hold one of each sixteenth of its range. Of each effect the higher of their rungs is taken. A
-    step other than the one that the contact itself asks for is the least over the first records.
+    Pilots are the records of smallest and largest primary severity among the first sixteen, which
+    hold one of each sixteenth of its range. For each effect the higher of their rungs is taken. If
+    the step is not the one required by the contact, it is the smallest over the first records.
     """
     pinned = pinned_by(recipe)
     samples = list(islice(sample_records(recipe, _SAMPLED, seed=seed), _SAMPLED))
@@ -214,7 +214,7 @@ def _pilots(recipe: Recipe, samples: Sequence[Sample]) -> list[Sample]:
 
 
 def _highest(effect: Effect, found: Sequence[Resolution]) -> str:
-    """The higher rung; a level that the recipe's own scene has not is coarser than those it has."""
+    """The higher rung; a level that the recipe's own scene lacks is coarser than those it has."""
     names = [rung.name for rung in effect.rungs]
     chosen = [each.rungs[effect.name] for each in found]
     return max(chosen, key=lambda name: names.index(name) if name in names else -1)
@@ -223,13 +223,13 @@ def _highest(effect: Effect, found: Sequence[Resolution]) -> str:
 def _values(
     effects: Sequence[Effect], rungs: Mapping[str, str], scenes: Sequence[Scene]
 ) -> dict[str, Any]:
-    """Values of the rungs; of a step the least that any record asks for."""
+    """Values of the rungs; for a step the smallest that any record needs."""
     values: dict[str, Any] = {}
     for effect in effects:
         level = rungs[effect.name]
         if effect.name != "step":
             values |= effect.rung(level).values
-        elif level != _OWN_STEP:  # else every record finds its own
+        elif level != _OWN_STEP:  # otherwise every record determines its own step
             [path] = effect.rungs[-1].values
             values[path] = min(_step_of(s, level) for s in scenes)
     return values
@@ -239,7 +239,7 @@ _OWN_STEP = "x1"
 
 
 def _step_of(scene: Scene, level: str) -> float:
-    """Of the level, or of the coarsest where a scene has none so coarse."""
+    """Step at the level, or at the coarsest of the scene if it has none so coarse."""
     [effect] = [each for each in effects_of(scene) if each.name == "step"]
     rung = {each.name: each for each in effect.rungs}.get(level, effect.rungs[0])
     [step] = rung.values.values()
@@ -247,18 +247,18 @@ def _step_of(scene: Scene, level: str) -> float:
 
 
 def with_choice(recipe: Recipe, choice: FidelityChoice | None) -> Recipe:
-    """The recipe with what was chosen written over its scene, as an override that the file keeps.
+    """The recipe with the choice written over its scene, as an override that the file keeps.
 
     Parameters
     ----------
     recipe : Recipe
     choice : Choice or None
-        None: what is written is taken as it is.
+        The choice; None for rungs as written.
 
     Returns
     -------
     Recipe
-        Whose scene says ``fidelity = "given"``.
+        Recipe whose scene has ``fidelity = "given"``.
     """
     if choice is None and recipe.scene.fidelity == "given":
         return recipe

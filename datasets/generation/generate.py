@@ -1,6 +1,6 @@
-"""A recipe goes in, a labelled data set file comes out.
+"""From a recipe to a labelled data set file.
 
-Workers simulate, this process alone writes. A killed run is resumed by the same call.
+Workers simulate, only this process writes. A killed run is resumed by the same call.
 """
 
 import math
@@ -41,15 +41,16 @@ from .fidelity_choice import FidelityChoice, choose, with_choice
 from .work import NUMERICS, RecordJob, RecordOutcome, each_alone, numerics_of, simulated, together
 
 _TOGETHER = 32
-"""Records of a batch: two for every lane, all of as many steps; few enough to be kept in memory."""
+"""Largest batch of records: two per lane, all with the same number of steps; few enough for
+memory."""
 
 _FEWEST = 5
-"""Records of a batch that is worth it."""
+"""Smallest batch that is worthwhile."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What a run of `generate` made.
+    """Result of a run of `generate`.
 
     Attributes
     ----------
@@ -64,12 +65,11 @@ class Summary:
     failures : dict of str to int
         Records of each status other than ``ok``; their signal is zero.
     first_failures : tuple of str
-        Text of the first few failures of this run.
+        Error text of the first few failures of this run.
     n_clipped : int
         Records with saturated samples.
     fidelity : Choice or None
-        Rungs that were chosen for the whole set, with what they save; None where they are as
-        written.
+        Rungs chosen for the whole set, with the savings; None if they are as written.
     """
 
     path: Path
@@ -84,7 +84,7 @@ class Summary:
 
 
 class Stopped(KeyboardInterrupt):
-    """A run was stopped by hand; says what is kept and how to go on."""
+    """A run was stopped by hand; the text says what is kept and how to resume."""
 
 
 def generate(
@@ -112,27 +112,27 @@ def generate(
         Records; None for the recipe's own number.
     path : str or Path
         File to write; ``<path>.part`` until finished. An unfinished file of the same call is
-        gone on with.
+        resumed.
     view : str
-        As of :func:`~.recipe.load.load_recipe`: record `i` of every view is of the same machine
+        As for :func:`~.recipe.load.load_recipe`: record `i` of every view is of the same machine
         state.
     seed : int
-        Of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.
+        Seed of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.
     jobs : int
-        Processes that simulate, >= 1; no more are started than there are records. Signal and
-        manifest are the same for any number.
+        Number of simulating processes, >= 1; at most one per record is started. Signal and manifest
+        are the same for any number.
     scheduler : str, optional
         Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers simulate instead of `jobs`
-        processes here; the same bytes again, on processors of one kind.
+        local processes; the bytes are the same on processors of one kind.
     force : bool
-        Replace an existing file and start an unfinished one anew.
+        Replace an existing file and restart an unfinished one.
     truth : bool
         Store the hidden quantities of each record.
     fidelity : {"auto", "given"}, optional
-        Least rungs that the scene's accuracy needs, or those that are written; as the recipe says
-        by default, else as its scene does. Chosen once, and stored before the first record.
+        Cheapest rungs that meet the scene's accuracy, or rungs as written; by default as in the
+        recipe, or else in its scene. Chosen once, and stored before the first record.
     progress : callable, optional
-        Called with (records done, records in all) after each.
+        Called with (records done, records in total) after each.
     say : callable, optional
         Called with a line about each pilot of the choice, and about workers.
 
@@ -144,20 +144,21 @@ def generate(
     Raises
     ------
     RecipeError
-        The recipe is at fault; nothing is written.
+        If the recipe has faults; nothing is written.
     DataError
-        The file exists, another run is writing it, an unfinished one is of another run, `jobs` is
-        below one, there is no room, `scheduler` cannot be used, or every record failed (the file
-        stays, to be looked at).
+        If the file exists, another run is writing it, an unfinished one belongs to another run,
+        `jobs` is below one, there is no room, `scheduler` cannot be used, or every record failed
+        (the file is kept for inspection).
     WorkersError, WriteError
-        Workers or scheduler were lost, or the disk is full or failing. What is written stays in
-        the unfinished file, and the same call goes on with it.
+        If workers or scheduler were lost, or the disk is full or failing. The records written stay
+        in the unfinished file, and the same call resumes it.
     LostError
-        The unfinished file was deleted, moved or replaced; nothing is kept.
+        If the unfinished file was deleted, moved or replaced; nothing is kept.
     OutputError
-        A file of that name appeared meanwhile; the finished one keeps the unfinished one's name.
+        If a file of that name has appeared meanwhile; the finished file keeps the name of the
+        unfinished one.
     Stopped
-        A KeyboardInterrupt came; as above.
+        On a KeyboardInterrupt; records are kept as above.
 
     Notes
     -----
@@ -224,7 +225,7 @@ def generate(
 
 @contextmanager
 def _listening() -> Iterator[threading.Event]:
-    """Keep a Ctrl-C in mind: one that arrives in a callback, of HDF5 or a finaliser, is lost.
+    """Remember a Ctrl-C: one that arrives in a callback of HDF5 or a finaliser would be lost.
 
     It is not reported as lost either: the run stops at the next record.
     """
@@ -255,7 +256,7 @@ def _listening() -> Iterator[threading.Event]:
 
 @contextmanager
 def _going_on(writer: DataSetWriter) -> Iterator[None]:
-    """Tell with whatever stops a run what is kept, and how to go on."""
+    """Add to any error that stops a run what is kept, and how to resume."""
     try:
         yield
     except KeyboardInterrupt:
@@ -266,7 +267,7 @@ def _going_on(writer: DataSetWriter) -> Iterator[None]:
         raise type(error)(f"{error}; {_kept(writer)}") from error
     except DataError:
         writer.close()
-        if not writer.done.any():  # workers that cannot be used: nothing has begun
+        if not writer.done.any():  # workers that cannot be used: nothing has been written
             writer.part.unlink(missing_ok=True)
         raise
 
@@ -284,7 +285,7 @@ def _kept(writer: DataSetWriter) -> str:
 
 
 def _refuse_refusal(outcome: RecordOutcome, work: Callable[[RecordJob], RecordOutcome]) -> None:
-    """A worker elsewhere may only lack a file that the scene names: ask again here."""
+    """Repeat a refused record here: a remote worker may only lack a file that the scene names."""
     if outcome.refused is not None and work(outcome.refused).refused is None:
         raise WorkersError(
             f"record {outcome.index} is refused by a worker ({outcome.fault}) and simulated here; "
@@ -301,7 +302,7 @@ def _chosen(
     force: bool,
     say: Callable[[str], None] | None,
 ) -> FidelityChoice | None:
-    """The choice that an unfinished file already holds, or a new one; None for rungs as written."""
+    """The choice stored in an unfinished file, or a new one; None for rungs as written."""
     refuse_output(Path(path).absolute(), force)
     wanted = fidelity or plan.table.fidelity or plan.scene.fidelity
     if wanted == "given":
@@ -387,14 +388,14 @@ def _limits(scene: Scene, severity: str) -> dict[str, Any]:
 
 
 def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
-    """Records that a worker simulates side by side: no bytes depend on it, only time and memory."""
+    """Number of records that a worker simulates in parallel; it affects only time and memory."""
     each = math.ceil(todo / jobs)
-    rounds = math.ceil(each / _TOGETHER)  # as many batches for every worker, of one size
+    rounds = math.ceil(each / _TOGETHER)  # equal numbers of equal batches for all workers
     return math.ceil(each / rounds) if simulates_together(scene) and each >= _FEWEST else 1
 
 
 def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, ...]]:
-    """Records to simulate together: of one kind, but for what is left of every kind at the end."""
+    """Batches of records of one kind, except for the remainders of all kinds at the end."""
     waiting: dict[Hashable, list[RecordJob]] = {}
     for each in samples:
         kind = alike(each.scene) if size > 1 else None
@@ -411,7 +412,7 @@ def _name_of(waiting: tuple[Hashable, list[RecordJob]]) -> str:
 
 
 class _Tally:
-    """Counts of a run."""
+    """Counters of a run."""
 
     def __init__(self, count: int, choice: FidelityChoice | None) -> None:
         self.count, self.choice = count, choice
@@ -458,22 +459,22 @@ def save_solution(
     Parameters
     ----------
     scene : Scene
-        What was simulated.
+        Scene that was simulated.
     solution : Recording
-        Its result.
+        Result of the simulation.
     path : str or Path
         File to write.
     seed : int
-        Of the simulation, for the record.
+        Seed of the simulation, stored with the record.
     force : bool
         Replace an existing file.
     truth : bool
-        Also store the hidden quantities that the solution holds.
+        Also store the hidden quantities contained in the solution.
 
     Raises
     ------
     DataError
-        The file exists, or cannot be written.
+        If the file exists, or cannot be written.
     """
     severity = clearances(scene)
     primary = next(iter(severity), "")

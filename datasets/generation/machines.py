@@ -1,8 +1,8 @@
-"""What a run of each machine is judged by, and what else its simulator knows of it.
+"""Quantities of interest of each machine, and further results known to its simulator.
 
-Quantities of interest are what features use; by them rungs and steps are judged. Not trajectories:
-contact with clearance is chaotic, and two correct runs part company point by point. Each quantity
-is a value with its kind and its scale.
+Rungs and steps are judged by the quantities of interest, which are those that features use.
+Trajectories are not compared: contact with clearance is chaotic, and two correct runs diverge point
+by point. Each quantity is a value with its kind and its scale.
 """
 
 import math
@@ -26,35 +26,35 @@ from ...sim.scene.shaft import ShaftScene
 
 Float = NDArray[np.float64]
 
-_BANDS = 6  # wide enough that a record of twenty revolutions settles them
-_LEAST_AXIS = 0.02  # of the radial clearance: a smaller orbit is not measured relatively
+_BANDS = 6  # wide enough to converge within a record of twenty revolutions
+_LEAST_AXIS = 0.02  # of the radial clearance: below it, the error of an orbit is absolute
 _LEAST_REACTION = 0.1  # of the mean reaction of the line
 
 
 def level(mean_square: float) -> Quantity:
-    """A level in dB: 2 % of accuracy are 0.17 dB."""
+    """A level in dB: an accuracy of 2 % is 0.17 dB."""
     return float(decibel(mean_square)), "dB", 1.0
 
 
 def relative(value: float, least: float = 0.0) -> Quantity:
-    """A value whose error is taken of itself, or of `least` where it is less."""
+    """A value with a relative error; it is relative to `least` if the value is smaller."""
     return float(value), "relative", least
 
 
 def absolute(value: float, scale: float) -> Quantity:
-    """A value whose error is taken of a scale of the machine."""
+    """A value whose error is relative to a scale of the machine."""
     return float(value), "absolute", scale
 
 
 class Truth(NamedTuple):
-    """One number of a run."""
+    """One result of a run."""
 
     value: float
     unit: str
-    """SI; ``dB`` of levels, empty of ratios."""
+    """SI unit; ``dB`` for levels, empty for ratios."""
     words: str
     seen: bool = False
-    """Computed from the signals of the sensors; the others are known to the simulator alone."""
+    """Whether it is computed from sensor signals; otherwise only the simulator knows it."""
 
 
 # --- any machine
@@ -65,7 +65,7 @@ def _rms(values: Float) -> float:
 
 
 def _mean_peak(values: Float, turns: Float) -> float:
-    """Mean over whole revolutions of the largest value of each."""
+    """Mean over whole revolutions of the largest value in each."""
     number = np.floor(turns - turns[0]).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))
     whole = np.maximum.reduceat(values, starts)[: max(1, number[-1])]
@@ -95,20 +95,20 @@ def edges_of_bands(fs: float) -> Float:
 
 
 def pump_quantities(solution: Recording, _scene: Scene) -> dict[str, Quantity]:
-    """Of a reciprocating pump: bands of vibration, forces in pin and guide, force of the pressure.
+    """Reciprocating pump: bands of vibration, forces in pin and guide, force of the pressure.
 
     Parameters
     ----------
     solution : Recording
-        With its truth.
+        Recording with its truth.
     _scene : Scene
-        Not asked.
+        Not used.
 
     Returns
     -------
     dict of str to Quantity
-        Band levels over all accelerometers together; of each throw the rms force in the crank pin,
-        the mean over revolutions of its peak, rms forces of guide and pressure.
+        Band levels over all accelerometers together; for each throw the rms force in the crank pin,
+        the mean over revolutions of its peak, and rms forces of guide and pressure.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def _pump_truths(solution: Recording, scene: Scene) -> Iterator[tuple[str, Truth
 def _pressures(
     scene: PumpScene, truth: dict[str, Float], suffix: str, about: str
 ) -> Iterator[tuple[str, Truth]]:
-    """Range of the gauge pressure in a cylinder, and the ratio of its absolute ends."""
+    """Range of the gauge pressure in a cylinder, and the ratio of its absolute extremes."""
     if scene.pressure.rung == "none" or not scene.piston.diameter:
         return
     area = math.pi / 4 * scene.piston.diameter**2
@@ -170,7 +170,7 @@ def _pressures(
 
 
 def journal_quantities(solution: Recording, scene: Scene) -> dict[str, Quantity]:
-    """Of a journal bearing: place and size of the orbit, thinnest film, forces of the film.
+    """Journal bearing: position and size of the orbit, thinnest film, forces of the film.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def journal_quantities(solution: Recording, scene: Scene) -> dict[str, Quantity]
 def _axes(
     path: NDArray[np.complex128], angle: Float, least: float, suffix: str
 ) -> dict[str, Quantity]:
-    """Half axes of the synchronous orbit."""
+    """Semi-axes of the synchronous orbit."""
     forward, backward = (
         float(np.abs(part[0])) for part in filtered_orbits(path, angle / math.tau, [1.0])
     )
@@ -228,7 +228,7 @@ def _journal_truths(solution: Recording, scene: Scene) -> Iterator[tuple[str, Tr
 
 
 def shaft_quantities(solution: Recording, scene: Scene) -> dict[str, Quantity]:
-    """Of a shaft line: reactions, places and orbits of the journals, films, vibration, resonance.
+    """Shaft line: reactions, positions and orbits of the journals, films, vibration, resonance.
 
     Examples
     --------
@@ -259,8 +259,8 @@ def shaft_quantities(solution: Recording, scene: Scene) -> dict[str, Quantity]:
 def _resonance(solution: Recording) -> dict[str, Quantity]:
     """Frequency of the first resonance; damping ratio of the least damped motion.
 
-    Not the frequency of the latter: two motions may be damped alike, and whichever is a little
-    less so on one mesh or another would make it jump.
+    The frequency of that motion is not included: two motions may have similar damping, so that a
+    small change of the mesh could make it jump from one to the other.
     """
     numerics: dict[str, Any] = solution.numerics
     names = {"resonance_hz": "first_resonance_hz", "least_damping": "least_damping_ratio"}
@@ -268,7 +268,7 @@ def _resonance(solution: Recording) -> dict[str, Quantity]:
 
 
 def _orders(solution: Recording, scene: ShaftScene) -> dict[str, Quantity]:
-    """Accelerations at the speed and at the blade rate, all sensors together."""
+    """Accelerations at the shaft speed and the blade rate, all sensors together."""
     rows = solution.signal[: len(scene.sensors)]
     if not len(rows):
         return {}
@@ -287,27 +287,27 @@ def _shaft_truths(solution: Recording, _scene: Scene) -> Iterator[tuple[str, Tru
 
 
 def no_truths(_solution: Recording, _scene: Scene) -> Iterator[tuple[str, Truth]]:
-    """Of a machine whose hidden states nobody asks for."""
+    """No further results, for a machine without hidden states of interest."""
     yield from ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Known:
-    """What is known of a run of a machine.
+    """Results known for the runs of a machine.
 
     Attributes
     ----------
     quantities : callable
-        Recording with its truth, scene -> quantities of interest by name.
+        Function of a recording with its truth, and the scene: quantities of interest by name.
     words : mapping of str to tuple of str
-        Quantity, without the throw or the bearing -> words and unit.
+        Words and unit of each quantity, by its name without the throw or the bearing.
     truth : tuple of str or None
-        Names of the truth that the quantities read, of one part where there are many; None: any.
+        Names of the truth used by the quantities, for one part if there are many; None: any.
     truths : callable
-        Recording with its truth, scene -> further numbers by name.
+        Function of a recording with its truth, and the scene: further results by name.
     fewest_turns : int or None
-        Revolutions in which the quantities can be told; None where a recording must be whole, as
-        its load or speed changes, or its orbit takes a time of its own.
+        Revolutions needed for the quantities; None if a recording must be complete because its load
+        or speed changes, or its orbit takes its own time.
     """
 
     quantities: Quantities = band_quantities
@@ -359,11 +359,11 @@ KNOWN: dict[type[Scene], Known] = {
         truths=_shaft_truths,
     ),
 }
-"""Type of scene -> what is known of a run; a machine without a row is judged by its vibration."""
+"""Known results by type of scene; a machine without a row is judged by its vibration."""
 
 
 def known_of(scene: Scene) -> Known:
-    """What is known of the runs of a scene's machine.
+    """Known results of the runs of a scene's machine.
 
     Examples
     --------

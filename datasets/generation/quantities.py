@@ -1,4 +1,4 @@
-"""Quantities of interest in words, and the rungs that they ask for."""
+"""Descriptions of quantities of interest, and the rungs that a scene needs."""
 
 from dataclasses import replace
 
@@ -9,19 +9,19 @@ from .machines import edges_of_bands, known_of
 
 
 def quantity_label(name: str, scene: Scene) -> tuple[str, str]:
-    """A quantity of interest in words, and its unit.
+    """Description of a quantity of interest, and its unit.
 
     Parameters
     ----------
     name : str
-        Of the machine of the scene.
+        Name of the quantity.
     scene : Scene
-        That it is of.
+        Scene of its machine.
 
     Returns
     -------
     tuple of str
-        An unknown name stands for itself.
+        Description and unit; an unknown name is returned as it is.
 
     Examples
     --------
@@ -59,7 +59,7 @@ _KILO = 1000.0  # Hz
 
 
 def resolved(scene: Scene) -> tuple[Scene, Resolution | None]:
-    """A scene that can be run: with ``fidelity = "auto"`` the least model that it needs.
+    """A scene that can be run: with ``fidelity = "auto"``, the cheapest sufficient models.
 
     Parameters
     ----------
@@ -68,14 +68,14 @@ def resolved(scene: Scene) -> tuple[Scene, Resolution | None]:
     Returns
     -------
     scene : Scene
-        With fidelity "given".
+        Scene with fidelity "given".
     resolution : Resolution or None
-        What was chosen and why; None where the scene says itself.
+        The choice and its reasons; None if the scene has fidelity "given".
 
     Raises
     ------
     SceneError
-        The reference of the choice cannot be run.
+        If the reference of the choice cannot be run.
 
     Examples
     --------
@@ -93,6 +93,6 @@ def resolved(scene: Scene) -> tuple[Scene, Resolution | None]:
 
 
 def with_estimate(solution: Recording, resolution: Resolution) -> Recording:
-    """A solution whose estimated error is the one that was measured when its rungs were chosen."""
+    """A solution with the error estimate that was measured when its rungs were chosen."""
     numerics = {**solution.numerics, "estimated_error": resolution.estimated_error}
     return replace(solution, numerics=numerics)

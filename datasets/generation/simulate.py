@@ -1,4 +1,4 @@
-"""One simulated recording of a scene, by name: rungs chosen where the scene leaves them open."""
+"""One simulated recording of a scene, with rungs chosen if the scene leaves them open."""
 
 from collections.abc import Mapping
 from operator import index
@@ -24,29 +24,30 @@ def simulate(
     Parameters
     ----------
     scene : Scene, str, Path or mapping
-        A scene, as of :func:`wearstate.load_scene`, the name of a built-in one, a TOML file, or the
-        table of a scene as such a file has it.
-        With ``fidelity = "auto"`` the cheapest rungs that meet its accuracy are chosen first.
+        Scene, as from :func:`wearstate.load_scene`, name of a built-in one, TOML file, or table of
+        a scene as in such a file. With ``fidelity = "auto"`` the cheapest rungs that meet its
+        accuracy are chosen first.
     seed : int
         Seed of the sensor noise; the mechanics are deterministic.
     truth : bool
-        Also keep what no sensor tells (forces, orbits, pressures) in ``truth``, over ``time``.
+        Also keep quantities that no sensor measures (forces, orbits, pressures) in ``truth``, over
+        ``time``.
     raise_on_failure : bool
-        False: a failed run comes back with its status and a signal of zeros.
+        If False, a failed run is returned with its status and a signal of zeros.
 
     Returns
     -------
     Recording
-        Its ``warnings`` say what of scene and signal is hardly meant.
+        Its ``warnings`` list implausible properties of scene and signal.
 
     Raises
     ------
     ValueError
         If `seed` is negative.
     SceneError
-        There is no such scene, or a rung, the step or a sensor does not fit it.
+        If there is no such scene, or a rung, the step or a sensor does not fit it.
     SimulationError
-        The run failed and `raise_on_failure` is true.
+        If the run failed and `raise_on_failure` is true.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def simulate(
     >>> recording.truth["pin_force_n"].shape, recording.time.shape
     ((25600, 2), (25600,))
 
-    A table as of a TOML file is a scene too:
+    A table as from a TOML file is a scene, too:
 
     >>> table = scene.model_dump(mode="json", exclude_none=True)
     >>> wearstate.simulate({**table, "duration": "0.5 s"}).duration
@@ -72,7 +73,7 @@ def simulate(
 
 
 def _scene_of(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
-    """A scene however it is given."""
+    """Scene from any of its forms."""
     if isinstance(scene, Scene):
         return scene
     if isinstance(scene, Mapping):

@@ -1,7 +1,7 @@
-"""What the simulator knows of a run and no sensor tells, as single numbers with unit and words.
+"""Results of a run that no sensor measures, as single numbers with unit and description.
 
-The quantities of interest of :mod:`.generation.machines` are among them; these are for people,
-those judge rungs.
+They include the quantities of interest of :mod:`.generation.machines`; those serve to judge rungs,
+these are for people.
 """
 
 from collections.abc import Iterator
@@ -15,20 +15,20 @@ from .quantities import quantity_label
 
 
 def truths_of(solution: Recording, scene: Scene) -> dict[str, Truth]:
-    """Everything that is known of a run, by name.
+    """All known results of a run, by name.
 
     Parameters
     ----------
     solution : Recording
-        With its truth.
+        Recording with its truth.
     scene : Scene
-        Of the run.
+        Scene of the run.
 
     Returns
     -------
     dict of str to Truth
-        Quantities of interest of the machine; peaks, pressures and positions; wear as it is in the
-        scene, by its manifest column; guards of the run. Of a machine at rest the last two alone.
+        Quantities of interest of the machine; peaks, pressures and positions; wear of the scene, by
+        its manifest column; guards of the run. For a machine at rest, the last two only.
 
     Examples
     --------
@@ -69,7 +69,7 @@ _GUARDS = (
     "stability_margin",
     "clipped_samples",
 )
-"""Numerics of a run that say something about the machine, or about whether to believe it."""
+"""Numerics of a run that describe the machine, or whether the run can be trusted."""
 
 
 def _by_column(values: dict[str, float]) -> Iterator[tuple[str, Truth]]:

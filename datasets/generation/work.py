@@ -1,7 +1,6 @@
-"""What a worker does: records of a data set, simulated alone or side by side.
+"""Work of a worker: records of a data set, simulated one by one or in parallel lanes.
 
-A worker imports this module for its work, and no more than a simulation needs: each has the memory
-of all that it imports.
+Workers import this module, which imports only what a simulation needs, to save memory.
 """
 
 from collections.abc import Callable
@@ -49,7 +48,7 @@ NUMERICS = {
     "least_damped_hz": "<f8",
     "clipped_samples": "<i8",
 }
-"""Manifest columns taken from a solution; -1, NaN or empty where it does not give them."""
+"""Manifest columns taken from a solution; -1, NaN or empty if it does not provide them."""
 
 REFUSED = "refused"
 """Status of a record whose drawn scene the simulation does not accept."""
@@ -57,7 +56,7 @@ REFUSED = "refused"
 
 @dataclass(frozen=True)
 class RecordJob:
-    """One record to make: its number, seed, manifest values known before, and scene."""
+    """One record to make: its number, seed, scene, and the manifest values known before."""
 
     index: int
     seed: int
@@ -67,7 +66,7 @@ class RecordJob:
 
 @dataclass(frozen=True)
 class RecordOutcome:
-    """What a worker sends back: arrays and plain values only."""
+    """Result returned by a worker: arrays and plain values only."""
 
     index: int
     signal: NDArray[np.float32]
@@ -85,13 +84,13 @@ def each_alone(
 
 
 def together(jobs: tuple[RecordJob, ...], *, error: float | None) -> list[RecordOutcome]:
-    """Simulate records side by side; runs in a worker."""
+    """Simulate records in parallel lanes; runs in a worker."""
     scenes = [(each.scene, each.seed) for each in jobs]
     found = {
         number: _refused(jobs[number], str(solution))
         if isinstance(solution, SceneError)
         else outcome_of(jobs[number], solution, error)
-        for number, solution in simulate_many(scenes, doubts=False)  # which no data set keeps
+        for number, solution in simulate_many(scenes, doubts=False)  # data sets do not keep doubts
     }
     return [found[number] for number in range(len(jobs))]
 
@@ -106,7 +105,7 @@ def simulated(job: RecordJob, *, truth: bool, error: float | None) -> RecordOutc
 
 
 def outcome_of(job: RecordJob, solution: Recording, error: float | None) -> RecordOutcome:
-    """Outcome of a solved job; an error measured on pilots replaces a record's own guess."""
+    """Outcome of a solved job; an error measured on pilots replaces the record's own estimate."""
     status = solution.status
     row = {**job.row, "status": status.name.lower(), **numerics_of(solution)}
     return RecordOutcome(
@@ -136,5 +135,5 @@ def silence(scene: Scene) -> NDArray[np.float32]:
 
 
 def numerics_of(solution: Recording) -> dict[str, Any]:
-    """What of a solution's numerics stands in the manifest."""
+    """Numerics of a solution for the manifest."""
     return {name: value for name, value in solution.numerics.items() if name in NUMERICS}

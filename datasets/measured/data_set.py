@@ -33,39 +33,39 @@ from .rows import MEAN_SPEED, START, FileRows, GroupBy, file_rows
 NO_PULSES = "no_tacho_pulses"
 """Status of a record whose tacho has less than a revolution between its pulses."""
 
-_BATCH = 2**23  # numbers a worker reads before it hands them over: 32 MB
+_BATCH = 2**23  # numbers that a worker reads before it passes them on: 32 MB
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImportSummary:
-    """What an import made.
+    """Result of an import.
 
     Attributes
     ----------
     path : Path
         The file.
     n_records, n_files, n_groups : int
-        Records, files they are from, machines.
+        Numbers of records, of their files, and of machines.
     sample_rate : float
-        [Hz]
+        Sample rate [Hz].
     duration : float
-        Of a record [s].
+        Length of a record [s].
     channels : tuple of str
         Names with units.
     severities, labels : tuple of str
         Manifest columns of wear, and further labels and conditions.
     grades, statuses : dict
-        Records of each grade (-1 unknown) and of each status.
+        Number of records by grade (-1 unknown) and by status.
     left_over : dict
-        File -> time at its end that fills no record [s]; only where it is not zero.
+        Time at the end of a file that fills no record [s], by file; only if it is not zero.
     speeds : tuple of float
-        Least and largest mean speed by the tacho [Hz]; empty without one.
+        Smallest and largest mean speed by the tacho [Hz]; empty without one.
     unused_rows : int
-        Rows of the labels about other files.
+        Number of label rows about other files.
     twins : tuple of (str, str)
-        Files of different groups that hold a same record, byte for byte.
+        Pairs of files of different groups that hold an identical record.
     empty : dict
-        File -> its channels of NaN alone, which are left out.
+        Channels of NaN only by file, which are left out.
     """
 
     path: Path
@@ -109,37 +109,37 @@ def import_recordings(
     Parameters
     ----------
     files : sequence of str or Path
-        Of any formats; of one sample rate and the same channels. Records are sorted by their
-        names.
+        Files of any formats, with one sample rate and the same channels. Records are sorted by file
+        name.
     path : str or Path
-        File to write, whole or not at all.
+        File to write, completely or not at all.
     options : SourceOptions, optional
-        What the files do not declare.
+        Declarations that the files lack.
     tacho : str, optional
         Name of the tacho channel.
     pulses_per_revolution : int
-        Of the tacho.
+        Pulses of the tacho in one revolution.
     labels : Labels, optional
         From :func:`~.measured.labels.read_labels`.
     limits : Limits, optional
-        Of the first severity; they decide the grade.
+        Limits of the first severity; they determine the grade.
     group_by : {"file", "folder", "column"}, optional
-        What is one machine: groups decide every split, so that windows of one file are never on
-        both sides. The column ``group`` of the labels where there is one, else the file.
+        What counts as one machine: groups determine every split, so that windows of one file are
+        never on both sides. By default the column ``group`` of the labels if there is one, or else
+        the file.
     segment : float, optional
-        Length of a record [s]; whole files otherwise, which must then be of one length. What is
-        left at the end of a file is reported and left out, never padded.
+        Length of a record [s]; by default whole files, which must then be of one length. The
+        remainder at the end of a file is reported and left out, never padded.
     overlap : float
-        Part of a record that the next one repeats, 0 <= overlap < 1.
+        Share of a record that the next one repeats, 0 <= overlap < 1.
     places, directions : mapping of str to str, optional
-        Channel -> where it is and which way it points: of a force cell, the point and the
-        direction of the push.
+        Place and direction by channel; for a force cell, the point and the direction of the force.
     jobs : int
-        Processes that read, >= 1; the result does not depend on it.
+        Number of reading processes, >= 1; the result does not depend on it.
     force : bool
         Replace an existing file.
     progress : callable, optional
-        Called with (records done, records in all).
+        Called with (records done, records in total).
 
     Returns
     -------
@@ -149,13 +149,13 @@ def import_recordings(
     Raises
     ------
     DataError
-        A file cannot be read, lacks rate, unit, tacho or label, or differs from the others; no
-        record has tacho pulses; the output exists. Nothing is left behind.
+        If a file cannot be read, lacks rate, unit, tacho or label, or differs from the others; no
+        record has tacho pulses; or the output exists. Nothing is left behind.
 
     Notes
     -----
-    Memory holds a record, and a few tens of megabytes for every process. A record whose tacho has
-    less than a revolution between pulses has the status :data:`NO_PULSES`.
+    Memory holds one record, and a few tens of megabytes per process. A record whose tacho has less
+    than a revolution between pulses has the status :data:`NO_PULSES`.
 
     Examples
     --------
@@ -205,7 +205,7 @@ def import_recordings(
 def _placed(
     channels: tuple[Channel, ...], places: Mapping[str, str], directions: Mapping[str, str]
 ) -> tuple[Channel, ...]:
-    """Channels with the places and directions that are told."""
+    """Channels with the given places and directions."""
     names = [channel.name for channel in channels]
     faults = [
         f"{what}: no channel {name!r} is imported{nearest(name, names)}"
@@ -274,7 +274,7 @@ def _attributes(
 
 @dataclass(frozen=True, kw_only=True)
 class _Reading:
-    """How every file is read."""
+    """Settings for reading every file."""
 
     options: SourceOptions
     tacho: str | None
@@ -283,7 +283,7 @@ class _Reading:
 
 @dataclass(frozen=True)
 class _Record:
-    """What becomes one record."""
+    """Data of one record."""
 
     signal: NDArray[np.float32]
     row: dict[str, Any]
@@ -324,7 +324,7 @@ def _batch(reading: _Reading, n_samples: int, files: _Files) -> list[_Record]:
 
 
 def _batches(plan: ImportPlan) -> Iterator[_Files]:
-    """Files in order, small ones together up to a batch, a large one by itself."""
+    """Files in order, small ones grouped up to a batch, a large one by itself."""
     frame = plan.n_samples * len(plan.channels)
     waiting: _Files = []
     size = 0
@@ -418,13 +418,13 @@ def _range(values: Any) -> tuple[float, float]:
 
 
 def _twins(data: DataSet) -> tuple[tuple[str, str], ...]:
-    """Files of different groups that hold a same record; one pair for every such record."""
+    """Files of different groups that hold an identical record; one pair for every such record."""
     first: dict[int, int] = {}
     found: dict[tuple[str, str], None] = {}
     groups, files = data.manifest["group"].to_numpy(), data.manifest[FILE].to_numpy()
     for index, checksum in enumerate(data.manifest["signal_crc32"].tolist()):
         other = first.setdefault(checksum, index)
-        # of 100,000 records two have the same checksum by chance: look at them
+        # of 100,000 records two have the same checksum by chance: compare them
         if groups[other] != groups[index] and np.array_equal(
             data[other].signal, data[index].signal
         ):

@@ -1,4 +1,4 @@
-"""Columns of labels: what a heading means, and the values under it in SI."""
+"""Columns of labels: the meaning of a heading, and the values under it in SI."""
 
 import math
 import re
@@ -12,7 +12,7 @@ from ..file.machines import FILE
 from .label_table import listed
 
 Value = float | int | bool | str
-"""A label: NaN, -1 or empty where it is not known."""
+"""A label: NaN, -1 or empty if unknown."""
 
 GROUP, GRADE, ROW = "group", "grade", "row_in_file"
 CONFOUNDER = "confounder_"
@@ -27,7 +27,7 @@ RESERVED = (
     "start_s",
     "mean_speed_hz",
 )
-"""Manifest columns that an import writes by itself."""
+"""Manifest columns that an import writes itself."""
 
 ENDINGS = {
     "m": "length",
@@ -40,10 +40,10 @@ ENDINGS = {
     "pa_s": "viscosity",
     "kg_m": "unbalance",
 }
-"""Ending of the name of a column in SI -> dimension, a key of the table of units."""
+"""Dimension (key of the table of units) of a column in SI, by the ending of its name."""
 
 Place = Callable[[int], str]
-"""Where a row of a table is, for messages."""
+"""Text with the place of a row of a table, for messages."""
 
 _LONGEST_TEXT = 200  # byte
 HIGHEST_GRADE = 3
@@ -56,7 +56,7 @@ _SEVERITY = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)+_m")
 def columns_of(
     cells: Mapping[str, Sequence[str]], comma: bool, place: Place, faults: list[str]
 ) -> dict[str, tuple[Value, ...]]:
-    """Values by name in SI; a heading may say a unit."""
+    """Values by name in SI; a heading may contain a unit."""
     found: dict[str, tuple[Value, ...]] = {}
     for heading, column in cells.items():
         try:
@@ -75,7 +75,7 @@ def columns_of(
 
 
 def _heading(heading: str) -> tuple[str, str]:
-    """Name with its SI ending, and the unit that the heading declares."""
+    """Name with its SI ending, and the unit declared in the heading."""
     if not heading:
         raise ValueError("has no name; give it one")
     match = _HEADING.fullmatch(heading)
@@ -93,7 +93,7 @@ def _heading(heading: str) -> tuple[str, str]:
 
 
 def _ending(name: str) -> str | None:
-    """Longest of the known endings that a name has."""
+    """Longest of the known endings of a name."""
     return max((end for end in ENDINGS if name.endswith(f"_{end}")), key=len, default=None)
 
 
@@ -113,7 +113,7 @@ def _parsed(
 
 
 def _parser(name: str, unit: str, column: Sequence[str], comma: bool) -> Callable[[str], Value]:
-    """How the cells of a column are read."""
+    """Parser for the cells of a column."""
     if name == GRADE:
         return _grade
     if name == GROUP:
@@ -202,7 +202,7 @@ def known_severities(name: str) -> str:
     Parameters
     ----------
     name : str
-        As a person calls it.
+        Name as written by the user.
 
     Examples
     --------
@@ -216,6 +216,6 @@ def known_severities(name: str) -> str:
 
 
 def _is_severity(column: str) -> bool:
-    """True of a column that a machine's own wear has."""
+    """Whether a column is a wear label of a built-in machine."""
     known = (each.column.replace("{}", "[0-9]+") for each in all_wear_places().values())
     return any(re.fullmatch(pattern, column) for pattern in known)

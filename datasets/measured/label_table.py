@@ -1,4 +1,4 @@
-"""The CSV of labels, as its cells stand: every row of as many cells as its head."""
+"""The CSV file of labels as written: every row has as many cells as the header."""
 
 import csv
 import io
@@ -10,21 +10,21 @@ from ..file.csv_cells import plain_cell
 from ..file.machines import FILE
 
 LARGEST_TABLE = 2**26
-"""Largest believable table of labels [byte]."""
+"""Largest plausible table of labels [byte]."""
 
-_SHOWN = 5  # of a list in a message
-_MOST_FAULTS = 20  # of a message, before it counts the rest
+_SHOWN = 5  # items of a list shown in a message
+_MOST_FAULTS = 20  # in one message; the others are counted
 
 
 def refusal(faults: Sequence[str]) -> DataError:
-    """One error of many faults: the first of them, and how many more."""
+    """One error for many faults: the first ones, and the number of others."""
     more = len(faults) - _MOST_FAULTS
     last = [f"and {more} more faults"] if more > 0 else []
     return DataError("\n".join([*faults[:_MOST_FAULTS], *last]))
 
 
 def listed(words: Sequence[str]) -> str:
-    """The first few of a list, and how many more.
+    """The first few items of a list, and the number of others.
 
     Examples
     --------
@@ -36,7 +36,7 @@ def listed(words: Sequence[str]) -> str:
 
 
 class LabelTable:
-    """Cells of a table by column, with the lines they are from."""
+    """Cells of a table by column, with their line numbers."""
 
     def __init__(self, source: str = "", comma: bool = False) -> None:
         self.source = source
@@ -46,12 +46,12 @@ class LabelTable:
         self.columns: dict[str, list[str]] = {}
 
     def place(self, row: int) -> str:
-        """Where a row is, for messages."""
+        """Text with the place of a row, for messages."""
         return f"{self.source} line {self.lines[row]}"
 
 
 def read_label_table(path: Path, faults: list[str]) -> LabelTable:
-    """Cells of a table of labels by column, with the numbers of its lines; its delimiter found."""
+    """Cells of a table of labels by column, with line numbers; the delimiter is detected."""
     text = _table_text(path)
     ways = [d for d in ",;\t" if FILE in next(_rows(path, text, d), (0, [""]))[1]]
     if not ways:
@@ -84,7 +84,7 @@ def _filled_table(
         if len(cells) != len(headings):
             faults.append(
                 f"{table.source} line {line}: has {len(cells)} cells, must have {len(headings)}; "
-                "mend it"
+                "correct it"
             )
             continue
         table.lines.append(line)
@@ -113,11 +113,11 @@ def _table_text(path: Path) -> str:
 
 
 def _rows(path: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    """Lines that are not blank, with their numbers."""
+    """Non-blank lines with their numbers."""
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     try:
         for cells in reader:
             if any(cell.strip() for cell in cells):
                 yield reader.line_num, [plain_cell(cell.strip()) for cell in cells]
     except csv.Error as error:
-        raise DataError(f"{path} line {reader.line_num}: {error}; mend it") from None
+        raise DataError(f"{path} line {reader.line_num}: {error}; correct it") from None

@@ -1,4 +1,4 @@
-"""Labels of measured files, from a CSV beside them or one value for all; and wear limits."""
+"""Labels of measured files, from a CSV file or one value for all; and wear limits."""
 
 import difflib
 import math
@@ -23,19 +23,19 @@ class Labels:
     Attributes
     ----------
     source : str
-        File they are from, for messages; empty where all are constants.
+        File of the labels, for messages; empty if all are constants.
     entries : tuple of str
-        What each row says of its file; empty without a table.
+        File entry of each row; empty without a table.
     lines : tuple of int
         Line of each row in its file.
     rows : tuple of int, optional
-        Which row of its file each one is about, where rows are records.
+        Row number within its file for each row of the table, if rows are records.
     columns : mapping
-        Name -> a value per row.
+        Values of each row, by name.
     constants : mapping
-        Name -> the value of every file.
+        Value for all files, by name.
     severities : tuple of str
-        Columns that say how worn a machine is [m].
+        Columns that hold the wear of a machine [m].
     """
 
     source: str = ""
@@ -48,12 +48,12 @@ class Labels:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every label, severities first."""
+        """All labels, severities first."""
         rest = [n for n in (*self.columns, *self.constants) if n not in self.severities]
         return (*self.severities, *rest)
 
     def numpy_types(self) -> dict[str, str]:
-        """Manifest columns with their types; group and grade have a place of their own."""
+        """Manifest columns with their types; group and grade are stored separately."""
         return {
             name: _numpy_type(self.columns.get(name) or (self.constants[name],))
             for name in self.names
@@ -66,19 +66,19 @@ class Labels:
         Parameters
         ----------
         paths : sequence of Path
-            Absolute. A row is about the file whose path ends in the row's entry.
+            Absolute paths. A row applies to the file whose path ends in the row's entry.
 
         Returns
         -------
         rows : list of dict
-            Name -> value, of each file.
+            Values by name, for each file.
         unused : int
-            Rows about files that are not among `paths`.
+            Number of rows about files that are not among `paths`.
 
         Raises
         ------
         DataError
-            A file has no row or several, or a row fits several files; all at once.
+            If a file has no row or several, or a row matches several files; all at once.
         """
         if not self.source:
             return [dict(self.constants) for _ in paths], 0
@@ -93,26 +93,26 @@ class Labels:
     def of_rows(
         self, paths: Sequence[Path], counts: Sequence[int]
     ) -> tuple[list[dict[str, Value]], int]:
-        """Labels of each row of each file, one file behind the other.
+        """Labels of each row of each file, one file after the other.
 
         Parameters
         ----------
         paths : sequence of Path
-            Absolute.
+            Absolute paths.
         counts : sequence of int
-            Rows of each.
+            Number of rows of each file.
 
         Returns
         -------
         rows : list of dict
-            Name -> value, of each row of each file.
+            Values by name, for each row of each file.
         unused : int
-            Rows of the table about other files.
+            Number of rows of the table about other files.
 
         Raises
         ------
         DataError
-            As :meth:`of_files`, about rows.
+            As for :meth:`of_files`, about rows.
         """
         found = _matches(self.entries, paths)
         faults = self._ambiguous(found, paths)
@@ -174,7 +174,7 @@ class Labels:
 
 
 def _matches(entries: Sequence[str], paths: Sequence[Path]) -> list[list[int]]:
-    """Files that each entry is about: the last parts of their path are its parts."""
+    """Files that each entry matches: their path ends in the parts of the entry."""
     by_name: dict[str, list[int]] = {}
     for i, path in enumerate(paths):
         by_name.setdefault(path.name, []).append(i)
@@ -200,32 +200,32 @@ def read_labels(
     constants: Mapping[str, str] | None = None,
     severities: Sequence[str] = (),
 ) -> Labels:
-    r"""Read labels from a CSV file, from words, or both.
+    r"""Read labels from a CSV file, from constants, or both.
 
     Parameters
     ----------
     path : str or Path, optional
-        Table with a header; its column ``file`` holds file names, or as much of their paths as
-        tells them apart. Comma, semicolon or tab; a decimal comma where commas do not separate.
+        Table with a header; its column ``file`` holds file names, or as much of their paths as is
+        needed to distinguish them. Comma, semicolon or tab; a decimal comma unless commas separate.
         A column ``row_in_file`` labels single rows of files whose rows are records, from 0.
     constants : mapping, optional
-        Label -> text, the same for all files.
+        Texts by label, the same for all files.
     severities : sequence of str
-        Labels that say how worn a machine is, besides those that recipes know; the first one is
-        that which models are trained for unless told otherwise.
+        Labels that hold the wear of a machine, in addition to those known from recipes; models are
+        trained for the first one by default.
 
     Returns
     -------
     Labels
-        Numbers in SI, texts as they are. A name ends in the SI unit (``speed_hz``); a unit in the
-        heading (``speed [rpm]``) or behind the number is converted, and the former gives the name
-        its ending. ``grade`` (0 to 3) and ``group`` (the machine) are known by name;
-        ``confounder_`` begins a column of 0 and 1. An empty cell is not known.
+        Numbers in SI, texts unchanged. A name ends in the SI unit (``speed_hz``); a unit in the
+        heading (``speed [rpm]``) or after the number is converted, and one in the heading adds the
+        ending to the name. ``grade`` (0 to 3) and ``group`` (the machine) are known by name;
+        ``confounder_`` begins a column of 0 and 1. An empty cell means unknown.
 
     Raises
     ------
     DataError
-        The table cannot be read or a value does not fit its name; all faults at once.
+        If the table cannot be read or a value does not fit its name; all faults at once.
 
     Examples
     --------
@@ -263,7 +263,7 @@ def read_labels(
 
 
 def _row_numbers(table: "LabelTable", faults: list[str]) -> tuple[int, ...] | None:
-    """Rows that a table is about, of which it has a column or not."""
+    """Row numbers in the files that a table labels, or None if it has no such column."""
     cells = table.columns.pop(ROW, None)
     if cells is None:
         return None
@@ -286,9 +286,9 @@ class LabelLimits:
     Attributes
     ----------
     edges : tuple of float
-        Where grades 1, 2, 3 begin [m], rising; the last one condemns.
+        Severities at which grades 1, 2, 3 begin [m], rising; the last one condemns.
     source : str
-        Where they are from.
+        Source of the limits.
     """
 
     edges: tuple[float, ...]
@@ -296,22 +296,23 @@ class LabelLimits:
 
 
 def read_limits(text: str, severities: Sequence[str]) -> LabelLimits:
-    """Read wear limits as a person gives them.
+    """Read wear limits as given by the user.
 
     Parameters
     ----------
     text : str
-        Three lengths with commas between, or a scene (built-in name or file) that has limits for
+        Three lengths separated by commas, or a scene (built-in name or file) that has limits for
         the severity.
     severities : sequence of str
-        Of the labels; limits are those of the first.
+        Severities of the labels; limits are those of the first.
 
     Raises
     ------
     DataError
-        There is no severity, it is not three lengths that rise, or the scene has no such limits.
+        If there is no severity, the text is not three rising lengths, or the scene has no such
+        limits.
     SceneError
-        There is no such scene.
+        If there is no such scene.
 
     Examples
     --------
@@ -323,7 +324,7 @@ def read_limits(text: str, severities: Sequence[str]) -> LabelLimits:
     if not severities:
         raise DataError(
             f"limits = {text!r} must be about a severity, the labels have none; label the wear in "
-            "metres and say which label it is with severity"
+            "metres and name that label with severity"
         )
     if "," in text:
         return LabelLimits(edges=_edges(text), source="given on import")

@@ -1,4 +1,4 @@
-"""Which pieces of which files become the records of a data set: all must be of one kind."""
+"""Pieces of files that become the records of a data set: all must be of one kind."""
 
 import os
 from collections import Counter
@@ -18,8 +18,8 @@ from ..workers.local import in_order
 from .label_table import listed, refusal
 
 RATE_TOLERANCE = 1e-5
-"""Relative difference of sample rates that count as one: rates from a printed column of times
-differ by their last digit. It moves a spectrum by a tenth of a line in 10,000 lines."""
+"""Relative difference of sample rates that count as equal: rates from a printed time column differ
+in their last digit. It shifts a spectrum by a tenth of a line in 10,000 lines."""
 
 _WORTH_WORKERS = 2**26  # byte of files; below it workers take longer to start than to read
 
@@ -30,11 +30,11 @@ class EachChannel(Mapping[str, str]):
     Parameters
     ----------
     named : mapping
-        Channel -> declaration.
+        Declarations by channel.
     others : str, optional
-        For every channel not in `named`.
+        Declaration for every channel not in `named`.
     but : str, optional
-        A channel that `others` is not about.
+        A channel to which `others` does not apply.
 
     Examples
     --------
@@ -65,7 +65,7 @@ class EachChannel(Mapping[str, str]):
 
 
 def sparing_tacho(options: SourceOptions, tacho: str | None) -> SourceOptions:
-    """The same options, with the tacho, which unit and sensitivity of all channels leave out.
+    """The options with unit and sensitivity of all channels not applied to the tacho.
 
     Parameters
     ----------
@@ -92,14 +92,14 @@ def _sparing(
 
 
 def channels_of_source(source: Source, tacho: str | None) -> tuple[Channel, ...]:
-    """Channels of a source as a data set has them.
+    """Channels of a source in the form of a data set.
 
-    A tacho needs no unit, since only its edges count: without one it has "-".
+    A tacho needs no unit, since only its edges count: without one its unit is "-".
 
     Raises
     ------
     DataError
-        Rate or a unit is declared by nobody, or there is no such tacho; all faults at once.
+        If rate or a unit is not declared, or there is no such tacho; all faults at once.
     """
     names = [channel.name for channel in source.channels]
     spared = f"channel '{tacho}': "
@@ -124,28 +124,28 @@ def channels_of_source(source: Source, tacho: str | None) -> tuple[Channel, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What a file holds, without its samples.
+    """Content of a file, without its samples.
 
     Attributes
     ----------
     path : Path
-        Absolute.
+        Absolute path.
     name : str
-        As messages and the manifest name it: its path below the folder that all files share.
+        Name in messages and manifest: the path below the folder that all files share.
     channels : tuple of Channel
-        As the data set has them.
+        Channels in the form of the data set.
     sample_rate : float
-        [Hz]
+        Sample rate [Hz].
     n_samples : int
-        Per channel.
+        Number of samples per channel.
     conditions : mapping
         Manifest columns that the file declares, in SI.
     named : bool
-        File or caller name the channels.
+        Whether file or caller name the channels.
     n_records : int
-        Rows that are records of their own, each of `n_samples`.
+        Number of rows that are separate records, each of `n_samples`.
     empty : tuple of str
-        Channels of NaN alone, which are left out.
+        Channels of NaN only, which are left out.
     """
 
     path: Path
@@ -165,19 +165,19 @@ class Header:
 
     @property
     def length(self) -> str:
-        """Length for people."""
+        """Length in readable units."""
         return f"{self.duration:.6g} s ({self.n_samples} samples)"
 
 
 def read_headers(
     files: Sequence[str | Path], options: SourceOptions, tacho: str | None, *, jobs: int = 1
 ) -> tuple[Header, ...]:
-    """Look into every file; sorted by name, whatever order they come in.
+    """Read the headers of all files; sorted by name.
 
     Raises
     ------
     DataError
-        A file is given twice, cannot be read, or lacks rate, unit or tacho; all at once.
+        If a file is given twice, cannot be read, or lacks rate, unit or tacho; all at once.
     """
     paths = [Path(os.path.abspath(file)) for file in files]
     _refuse_twice(paths)
@@ -193,7 +193,7 @@ def read_headers(
 
 
 def worth_workers(paths: Sequence[Path], jobs: int) -> int:
-    """Worker processes that reading these files is worth; the result does not depend on them."""
+    """Number of worker processes worth starting for these files; results do not depend on it."""
     size = sum(path.stat().st_size for path in paths if path.is_file())
     return min(jobs, len(paths)) if size > _WORTH_WORKERS else 1
 
@@ -210,14 +210,14 @@ def _refuse_twice(paths: Sequence[Path]) -> None:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Path of each file below the folder that all share; bytes that are no UTF-8 as numbers."""
+    """Path of each file below the folder that all share; bytes that are not UTF-8 as numbers."""
     base = os.path.commonpath([path.parent for path in paths])
     names = [path.relative_to(base).as_posix() for path in paths]
     return [os.fsencode(name).decode(errors="backslashreplace") for name in names]
 
 
 def _header(options: SourceOptions, tacho: str | None, item: tuple[Path, str]) -> Header | str:
-    """Header of a file, or what is wrong with it; runs in a worker."""
+    """Header of a file, or its fault as text; runs in a worker."""
     path, name = item
     if path.is_dir():
         return f"{path} is a folder, must be a file; name the files in it"
@@ -244,18 +244,18 @@ def _header(options: SourceOptions, tacho: str | None, item: tuple[Path, str]) -
 
 @dataclass(frozen=True, kw_only=True)
 class ImportPlan:
-    """Records to make of files.
+    """Records to make from files.
 
     Attributes
     ----------
     headers : tuple of Header
         Files, sorted by name.
     channels : tuple of Channel
-        Of every record.
+        Channels of every record.
     sample_rate : float
-        [Hz]
+        Sample rate [Hz].
     n_samples : int
-        Of every record.
+        Length of every record.
     starts : tuple of range
         First sample of every record, by file; the same in each of its rows that are records.
     """
@@ -268,7 +268,7 @@ class ImportPlan:
 
     @property
     def n_records(self) -> int:
-        """Records of all files."""
+        """Number of records of all files."""
         pairs = zip(self.headers, self.starts, strict=True)
         return sum(header.n_records * len(starts) for header, starts in pairs)
 
@@ -287,17 +287,17 @@ def plan_records(headers: Sequence[Header], segment: float | None, overlap: floa
     Parameters
     ----------
     headers : sequence of Header
-        Sorted.
+        Headers, sorted.
     segment : float or None
         Length of a record [s]; None for whole files, which must then be of one length.
     overlap : float
-        Part of a record that the next one repeats, 0 <= overlap < 1.
+        Share of a record that the next one repeats, 0 <= overlap < 1.
 
     Raises
     ------
     DataError
-        Files differ in rate, channels or length, are shorter than a segment, or a record is
-        larger than any believed; all at once.
+        If files differ in rate, channels or length, are shorter than a segment, or a record is
+        implausibly large; all at once.
     """
     faults = _bound_faults(segment, overlap)
     if faults:
@@ -363,7 +363,7 @@ def _channel_faults(headers: Sequence[Header]) -> list[str]:
 
 
 def _numbered_alike(headers: Sequence[Header]) -> Sequence[Header]:
-    """The same names for channels that no file names: its own stem is not what they have alike."""
+    """Common names for unnamed channels, whose own names contain the stem of their file."""
     names = {tuple(channel.name for channel in header.channels) for header in headers}
     counts = {len(header.channels) for header in headers}
     if any(header.named for header in headers) or len(names) == 1 or len(counts) > 1:
@@ -407,7 +407,7 @@ def _length_faults(headers: Sequence[Header], n_samples: int, segment: float | N
 
 
 def _kinds(values: Mapping[str, Hashable]) -> str:
-    """Who has what, the most common first."""
+    """Text of the values and their owners, the most common first."""
     counts = Counter(values.values())
     return "; ".join(
         f"{value} in {listed([name for name, own in values.items() if own == value])}"
@@ -416,7 +416,7 @@ def _kinds(values: Mapping[str, Hashable]) -> str:
 
 
 def _common_channels(headers: Sequence[Header]) -> tuple[Channel, ...]:
-    """Channels of the first file; a unit in the file only where all files agree on it."""
+    """Channels of the first file; with a unit in the file only if all files agree on it."""
     return tuple(
         channel
         if len({header.channels[i].unit_in_file for header in headers}) == 1

@@ -1,4 +1,4 @@
-"""One measured recording from a file, and what files hold."""
+"""One measured recording from a file, and the content of files."""
 
 import logging
 from collections.abc import Sequence
@@ -36,25 +36,25 @@ def read_recording(
     Parameters
     ----------
     path : str or Path
-        A data set of this program, or any format that :func:`~.readers.open.open_source` reads.
+        Data set of this program, or any format that :func:`~.readers.open.open_source` reads.
     options : SourceOptions, optional
-        What the file does not declare; ``record`` chooses one of a data set. Units are declared
+        Declarations that the file lacks; ``record`` chooses one of a data set. Units are declared
         or refused, never guessed.
     tacho : str, optional
         Name of the tacho channel; a data set knows its own.
     pulses_per_revolution : int
-        Of the tacho.
+        Pulses of the tacho in one revolution.
 
     Returns
     -------
     Recording
-        In SI units.
+        Recording in SI units.
 
     Raises
     ------
     DataError
-        The file is missing, truncated, damaged or of a format not known; nobody declares its
-        sample rate or a unit; what it declares contradicts the caller; it is too long.
+        If the file is missing, truncated, damaged or of unknown format; its sample rate or a unit
+        is not declared; its declarations contradict the caller; or it is too long.
 
     Examples
     --------
@@ -90,23 +90,23 @@ def read_recording(
 def with_views(
     recording: Recording, path: str | Path, record: int, views: Sequence[CompletingView]
 ) -> Recording:
-    """A recording with its views: of data sets by machine and state, of other files as they are.
+    """A recording with its views: for data sets by machine and state, for other files as given.
 
     Parameters
     ----------
     recording : Recording
-        As :func:`read_recording` gives it.
+        Recording from :func:`read_recording`.
     path : str or Path
-        Where it is from.
+        File of the recording.
     record : int
         Its number, if that is a data set.
     views : sequence of CompletingView
-        Files of the views; those that are no data sets must declare all by themselves.
+        Files of the views; those that are not data sets must contain all declarations.
 
     Raises
     ------
     DataError
-        As of :func:`read_recording`, :class:`~.file.views.JoinedSet` and
+        As for :func:`read_recording`, :class:`~.file.views.JoinedSet` and
         :func:`~.file.views.joined_recordings`.
     """
     if not views:
@@ -119,12 +119,12 @@ def with_views(
 
 
 def _is_ours(file: Path) -> bool:
-    """Whether an HDF5 file says that it is a data set; also where it cannot be read at all."""
+    """Whether an HDF5 file claims to be a data set; also True if it cannot be read at all."""
     try:
         with h5py.File(file, "r") as handle:
             return bool({"created_by", "schema_version"} & set(handle.attrs))
     except HDF5_FAULTS:
-        return True  # the reader of data sets has words for it
+        return True  # the reader of data sets reports it
 
 
 def _of_data_set(file: Path, options: SourceOptions, tacho: str | None) -> Recording:
@@ -161,23 +161,23 @@ def _refuse_long(source: Source) -> None:
 
 
 def read_window(source: Source, start: int, n_samples: int) -> NDArray[np.float32]:
-    """Read some samples of all channels, in pieces, so that only their float32 is held.
+    """Read some samples of all channels, in pieces, so that only their float32 is kept in memory.
 
     Parameters
     ----------
     source : Source
     start, n_samples : int
-        First sample and how many, within the source.
+        First sample and number of samples, within the source.
 
     Returns
     -------
     numpy.ndarray [shape=(n_channels, n_samples)]
-        In the units of the source.
+        Samples in the units of the source.
 
     Raises
     ------
     DataError
-        A sample is not finite or beyond single precision, or the file is damaged there.
+        If a sample is not finite or beyond single precision, or the file is damaged there.
     """
     window = np.empty((len(source.channels), n_samples), dtype=np.float32)
     step = max(1, _PIECE // len(source.channels))
@@ -197,24 +197,24 @@ def read_window(source: Source, start: int, n_samples: int) -> NDArray[np.float3
 def list_contents(
     files: Sequence[str | Path], options: SourceOptions | None = None
 ) -> list[dict[str, Any]]:
-    """What files hold, ready for JSON: nothing is read of their signals.
+    """Content of files, ready for JSON; no signals are read.
 
     Parameters
     ----------
     files : sequence of str or Path
     options : SourceOptions, optional
-        Layout and declarations; of what is chosen (variable, channels) nothing is used.
+        Layout and declarations; the selection (variable, channels) is ignored.
 
     Returns
     -------
     list of dict
-        A file after the other: ``file``, ``recordings`` (each with ``variable``, ``channels``,
+        One entry per file: ``file``, ``recordings`` (each with ``variable``, ``channels``,
         ``sample_rate_hz``, ``samples``, ``duration_s``, ``conditions``, ``undeclared``).
 
     Raises
     ------
     DataError
-        Files cannot be read; all at once.
+        If files cannot be read; all at once.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What the manifest says of every imported file: labels, conditions, machine and grade."""
+"""Manifest values of every imported file: labels, conditions, machine and grade."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -22,16 +22,16 @@ _LARGEST_GROUP = 2**63 - 1  # of the manifest's integers
 
 @dataclass(frozen=True, kw_only=True)
 class FileRows:
-    """Manifest values by file, or by row of a file where rows are labelled.
+    """Manifest values by file, or by row of a file if rows are labelled.
 
     Attributes
     ----------
     columns : mapping
-        Columns beside those of every data set -> numpy type, in order.
+        Columns in addition to those of every data set, with numpy types, in order.
     rows : mapping
-        Name and row of a file -> values; of a record only its start and its speed are missing.
+        Values by name and row of a file; only start and speed of a record are missing.
     unused : int
-        Rows of the labels about other files.
+        Number of label rows about other files.
     """
 
     columns: Mapping[str, str]
@@ -47,26 +47,26 @@ def file_rows(
     group_by: GroupBy | None = None,
     tacho: str | None = None,
 ) -> FileRows:
-    """Put together what labels and files say.
+    """Combine labels and declarations of files.
 
     Parameters
     ----------
     headers : sequence of Header
-        Files, sorted.
+        Headers of the files, sorted.
     labels : Labels
-        Of these files, and perhaps of others.
+        Labels of these files, and possibly of others.
     limits : Limits, optional
-        Of the first severity; they decide the grade.
+        Limits of the first severity; they determine the grade.
     group_by : {"file", "folder", "column"}, optional
-        See :func:`~.measured.data_set.import_recordings`.
+        As for :func:`~.measured.data_set.import_recordings`.
     tacho : str, optional
-        Name of the tacho channel: with one, the speed it shows is a column.
+        Name of the tacho channel: if given, the speed it shows is a column.
 
     Raises
     ------
     DataError
-        A file has no labels or contradicts them, the grade contradicts the limits, or what
-        grouping or limits need is not labelled; all at once.
+        If a file has no labels or contradicts them, the grade contradicts the limits, or labels
+        required by grouping or limits are missing; all at once.
     """
     places = [(header.name, row) for header in headers for row in range(header.n_records)]
     given, unused = _labelled(headers, labels)
@@ -102,7 +102,7 @@ def file_rows(
 
 
 def _labelled(headers: Sequence[Header], labels: Labels) -> tuple[list[Mapping[str, Value]], int]:
-    """Labels of every row that is a record, those of a file being those of all its rows."""
+    """Labels of every row that is a record; labels of a file apply to all its rows."""
     paths, counts = [header.path for header in headers], [header.n_records for header in headers]
     if labels.rows is not None:
         rows, unused = labels.of_rows(paths, counts)
@@ -141,7 +141,7 @@ def _group_names(
 
 
 def _numbers(names: Sequence[str]) -> dict[str, int]:
-    """Number of every group: its name where all names are numbers, else its place."""
+    """Number of every group: its name if all names are numbers, or else its position."""
     distinct = sorted(set(names))
     plain = all(name.isascii() and name.isdecimal() for name in distinct)
     own = {name: int(name) for name in distinct} if plain else {}
@@ -160,15 +160,15 @@ def _grades(
     limits: LabelLimits | None,
     faults: list[str],
 ) -> list[int]:
-    """Grade by the limits, or as labelled; -1 where neither is known."""
+    """Grade by the limits, or as labelled; -1 if neither is known."""
     labelled = [int(own.get(GRADE, -1)) for own in given]
     if limits is None:
         return labelled
     if not labels.severities:
         faults.append(
             f"limits must be about a severity, the labels have none: "
-            f"{', '.join(labels.names) or 'no label'}; label the wear in metres and say which "
-            "label it is with severity"
+            f"{', '.join(labels.names) or 'no label'}; label the wear in metres and name that "
+            "label with severity"
         )
         return labelled
     column = labels.severities[0]
@@ -190,7 +190,7 @@ def _grade(severity: Value, limits: LabelLimits) -> int:
 def _conditions(
     headers: Sequence[Header], given: Sequence[Mapping[str, Value]], faults: list[str]
 ) -> list[dict[str, float]]:
-    """Conditions that files declare; a label may repeat one, not contradict it."""
+    """Conditions declared by files; a label may repeat one, but not contradict it."""
     for header, own in zip(headers, given, strict=True):
         for name, value in header.conditions.items():
             label = own.get(name, math.nan)

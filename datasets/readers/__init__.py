@@ -1,5 +1,4 @@
-"""One reader per file format, and one way to open them all.
+"""One reader per file format, and one function that opens them all.
 
-It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``datasets.file``,
-``datasets.source``.
+It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``datasets.file``, ``datasets.source``.
 """

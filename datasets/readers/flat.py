@@ -1,4 +1,4 @@
-"""Numbers that lie in a file as they are: headerless binary, NPY, NPZ."""
+"""Numbers stored in a file without structure: headerless binary, NPY, NPZ."""
 
 import io
 import math
@@ -45,20 +45,20 @@ _NAMES = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Flat:
-    """Where the numbers of one array lie, and how to read some of them.
+    """Location of the numbers of one array, and how to read some of them.
 
     Attributes
     ----------
     place : Path or callable
-        The file, or what gives the bytes inflated from it.
+        The file, or a function that returns the decompressed bytes.
     offset : int
-        Of the first number [byte].
+        Position of the first number [byte].
     code : str
-        Numpy code, or ``<i3``, ``>i3`` of 24 bits, ``<i5`` to ``>i7`` of 40 to 56.
+        Numpy code, or ``<i3``, ``>i3`` for 24 bits, ``<i5`` to ``>i7`` for 40 to 56.
     n_channels, n_samples : int
         Shape.
     interleaved : bool
-        Sample by sample; else channel by channel.
+        Sample by sample; otherwise channel by channel.
     """
 
     place: Path | Callable[[], memoryview]
@@ -75,11 +75,11 @@ class Flat:
 
     @property
     def end(self) -> int:
-        """Where the array ends [byte]."""
+        """End of the array [byte]."""
         return self.offset + self.n_channels * self.n_samples * self.width
 
     def fetch(self, start: int, stop: int, rows: tuple[int, ...]) -> NDArray[Any]:
-        """Numbers [shape=(n_rows, stop - start)]; fewer samples where the file has shrunk."""
+        """Numbers [shape=(n_rows, stop - start)]; fewer samples if the file has shrunk."""
         count = stop - start
         if self.interleaved:
             raw = self._run(start * self.n_channels, count * self.n_channels)
@@ -91,7 +91,7 @@ class Flat:
         return np.stack([run[:shortest] for run in runs])
 
     def _run(self, first: int, count: int) -> NDArray[Any]:
-        """Numbers that follow one another."""
+        """Consecutive numbers."""
         place, size = self.offset + first * self.width, count * self.width
         if isinstance(self.place, Path):
             with self.place.open("rb") as handle:
@@ -110,7 +110,7 @@ def _widened(raw: NDArray[np.uint8], order: str, width: int) -> NDArray[Any]:
     """Integers of 3 byte as integers of 4, of 5 to 7 byte as integers of 8."""
     size = 4 if width == 3 else 8
     wide = np.zeros((len(raw) // width, size), dtype=np.uint8)
-    # the bytes become the upper ones, and the shift brings the sign down with them
+    # the bytes become the upper ones; the shift extends the sign
     if order == "<":
         wide[:, size - width :] = raw.reshape(-1, width)
     else:
@@ -129,7 +129,7 @@ def flat_code(text: str) -> str:
     Raises
     ------
     DataError
-        No such type, or no byte order where there are several bytes.
+        If there is no such type, or the byte order of several bytes is missing.
 
     Examples
     --------
@@ -147,20 +147,20 @@ def flat_code(text: str) -> str:
         return f"|{code}"
     if match.group(1) not in ("<", ">"):
         raise DataError(
-            f"dtype = {text!r} must say its byte order; write '<{match.group(2)}' (little-endian, "
-            f"as PCs write it) or '>{match.group(2)}' (big-endian)"
+            f"dtype = {text!r} must include its byte order; write '<{match.group(2)}' "
+            f"(little-endian, as on PCs) or '>{match.group(2)}' (big-endian)"
         )
     return match.group(1) + code
 
 
 def numbered(stem: str, count: int) -> tuple[PartChannel, ...]:
-    """Channels that the file does not name: the stem, with a number where there are several."""
+    """Channels that the file does not name: the stem, with a number if there are several."""
     names = [stem] if count == 1 else [f"{stem}_{i}" for i in range(count)]
     return tuple(PartChannel(name=name) for name in names)
 
 
 def stem_of(path: Path) -> str:
-    """Name for what a file leaves unnamed."""
+    """Name for unnamed content of a file."""
     return re.sub(r"\W+", "_", path.stem).strip("_") or "channel"
 
 
@@ -173,7 +173,7 @@ def raw_contents(path: Path, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        The layout is not declared, or the file's size does not fit it.
+        If the layout is not declared, or the file's size does not fit it.
     """
     if options.dtype is None or options.n_channels is None:
         raise DataError(
@@ -183,7 +183,7 @@ def raw_contents(path: Path, options: SourceOptions) -> Contents:
     code, count = flat_code(options.dtype), options.n_channels
     size = path.stat().st_size - options.offset
     frame = count * int(code[2:])
-    # channel by channel, what is missing would shift all channels but the first
+    # channel by channel, missing samples would shift all channels but the first
     if options.partial and options.order != "blocks":
         size = size // frame * frame
     if size < frame or size % frame:
@@ -220,7 +220,7 @@ def raw_contents(path: Path, options: SourceOptions) -> Contents:
 
 @dataclass(frozen=True, kw_only=True)
 class Axes:
-    """Which axis of an array is which."""
+    """Assignment of the axes of an array."""
 
     record: int | None
     channels_first: bool
@@ -236,15 +236,15 @@ def array_axes(shape: Sequence[int], options: SourceOptions, name: str) -> Axes:
     shape : sequence of int
         One axis; two of channels and samples, in either order; three with the record first.
     options : SourceOptions
-        `order` decides where the sides are equal, `record` picks along the first of three.
+        `order` decides if the sides are equal, `record` selects along the first of three axes.
     name : str
-        Of the array, for messages.
+        Name of the array, for messages.
 
     Raises
     ------
     DataError
-        Another number of axes, an empty one, sides that are equal, too many channels, or no
-        such record.
+        If the number of axes is wrong, one is empty, the sides are equal, there are too many
+        channels, or there is no such record.
 
     Examples
     --------
@@ -296,7 +296,7 @@ def npy_contents(path: Path, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        It is no NPY file, damaged, shorter than its header says, or holds no real numbers.
+        If it is not an NPY file, damaged, shorter than its header says, or holds no real numbers.
     """
     with path.open("rb") as handle:
         if handle.read(6) != b"\x93NUMPY":
@@ -317,7 +317,7 @@ _Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 
 
 def _npy_header(path: Path, name: str, handle: Any) -> _Header:
-    """Shape, Fortran order and type, of real numbers only."""
+    """Shape, Fortran order and type; real numbers only."""
     try:
         version = np.lib.format.read_magic(handle)
         read = {
@@ -329,7 +329,7 @@ def _npy_header(path: Path, name: str, handle: Any) -> _Header:
         shape, fortran, dtype = read(handle)
     except DataError:
         raise
-    # a forged header is Python text, and the parser's errors are of many types
+    # a forged header is Python text, and the parser raises many types of errors
     except Exception as error:
         raise damaged(path, error) from error
     if dtype.hasobject:
@@ -377,13 +377,13 @@ def _npy_part(
 
 
 def npz_contents(path: Path, options: SourceOptions) -> Contents:
-    """Arrays of an NPZ archive; stored ones are read in place, deflated ones inflated whole.
+    """Arrays of an NPZ archive; stored ones are read in place, compressed ones decompressed whole.
 
     Raises
     ------
     DataError
-        It is no archive or damaged, the array asked for holds no real numbers or inflates beyond
-        :data:`LARGEST_INFLATED`.
+        If it is not an archive or damaged, or the requested array holds no real numbers or
+        decompresses beyond :data:`LARGEST_INFLATED`.
     """
     with path.open("rb") as handle:
         if handle.read(4) != b"PK\x03\x04":
@@ -406,7 +406,7 @@ def npz_contents(path: Path, options: SourceOptions) -> Contents:
 
 
 def _npz_rate(archive: zipfile.ZipFile) -> RateNote:
-    """Of a single number under the name of a rate."""
+    """Rate from a single number under the name of a rate."""
     for info in archive.infolist():
         name = info.filename.removesuffix(".npy")
         if not is_rate_name(name) or info.file_size > _LONGEST_HEADER:
@@ -414,7 +414,7 @@ def _npz_rate(archive: zipfile.ZipFile) -> RateNote:
         try:
             value = np.load(io.BytesIO(archive.read(info)), allow_pickle=False)
             return rate_note(name, float(value.item()))
-        except (*_NO_NUMBER, zipfile.BadZipFile, zlib.error):  # whatever else it is, it is no rate
+        except (*_NO_NUMBER, zipfile.BadZipFile, zlib.error):  # anything else is not a rate
             continue
     return RateNote()
 
@@ -425,7 +425,7 @@ _NO_NUMBER = (ValueError, TypeError, EOFError, OSError, NotImplementedError, Mem
 def _npz_member(
     path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, options: SourceOptions
 ) -> FilePart | str:
-    """A part, or why it is none; the reason is an error where this very member is asked for."""
+    """A part, or why it is none; the reason is an error if this member is requested."""
     name = info.filename.removesuffix(".npy")
     try:
         return _npz_part(path, archive, info, name, options)
@@ -449,7 +449,7 @@ def _npz_part(
     try:
         with archive.open(info) as member:
             head = io.BytesIO(member.read(_LONGEST_HEADER))
-    # zipfile raises errors of many types on damaged or foreign archives
+    # zipfile raises many types of errors on damaged or foreign archives
     except Exception as error:
         raise damaged(path, error) from error
     header = _npy_header(path, label, head)
@@ -468,7 +468,7 @@ def _npz_part(
 
 
 def _inflater(path: Path, info: zipfile.ZipInfo) -> Callable[[], memoryview]:
-    """Content of a member, inflated when first asked for; its size has been checked."""
+    """Content of a member, decompressed on first use; its size has been checked."""
 
     @cache
     def content() -> memoryview:
@@ -482,7 +482,7 @@ def _inflater(path: Path, info: zipfile.ZipInfo) -> Callable[[], memoryview]:
 
 
 def _stored_at(path: Path, info: zipfile.ZipInfo) -> int:
-    """Where the bytes of a stored member begin, behind its local header."""
+    """Start of the bytes of a stored member, after its local header."""
     with path.open("rb") as handle:
         handle.seek(info.header_offset)
         head = handle.read(_LOCAL_HEADER)

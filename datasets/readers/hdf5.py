@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError
-from ..file.hdf5_values import HDF5_FAULTS, Place, is_loose_text, plain_value, texts_apart
+from ..file.hdf5_values import HDF5_FAULTS, Place, is_loose_text, plain_value, texts_by_subprocess
 from ..source.part import (
     LARGEST_INFLATED,
     Contents,
@@ -36,19 +36,19 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
     """Data sets of real numbers in an HDF5 file.
 
     An attribute ``unit`` or ``units`` declares the unit; one like ``sample_rate_hz``, or
-    ``sample_rate`` as a text with its unit, the rate.
+    ``sample_rate`` as a text with its unit, declares the rate.
 
     Raises
     ------
     DataError
-        It is no HDF5 file, damaged, or a data set of this program; the data set asked for cannot
-        be one recording, is kept in other files, or declares more than it holds.
+        If it is not an HDF5 file, damaged, or a data set of this program; or the requested data set
+        is not a single recording, is kept in other files, or declares more than it holds.
     """
     file = _opened(path)
     with closed_on_failure(path, file, HDF5_FAULTS):
         if {"schema_version", "sample_rate_hz", "channels"} <= set(file.attrs):
             raise DataError(
-                f"{path} is a data set of this program already; use it as it is, without importing"
+                f"{path} is a data set of this program already; use it directly, without importing"
             )
         arrays: list[tuple[str, Any, Axes]] = []
         others: list[str] = []
@@ -58,7 +58,7 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
                 others.append(axes)
             else:
                 arrays.append((name, item, axes))
-        texts = _texts_apart(path, [(name, item) for name, item, _ in arrays])
+        texts = _loose_texts(path, [(name, item) for name, item, _ in arrays])
         parts = [_hdf5_part(path, name, item, axes, texts) for name, item, axes in arrays]
     return Contents(parts=tuple(parts), others=tuple(others), close=file.close)
 
@@ -80,9 +80,7 @@ def _walk(path: Path, file: Any) -> Iterator[tuple[str, Any]]:
         for key in group:
             count += 1
             if count > MOST_LEAVES:
-                raise DataError(
-                    f"{path} holds > {MOST_LEAVES} data sets, the most believed; split it"
-                )
+                raise DataError(f"{path} holds > {MOST_LEAVES} data sets, too many; split it")
             name = f"{prefix}/{key}".lstrip("/")
             link = group.get(key, getlink=True)
             if not isinstance(link, h5py.HardLink):
@@ -97,7 +95,7 @@ def _walk(path: Path, file: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _recording_axes(path: Path, name: str, item: Any, options: SourceOptions) -> Axes | str:
-    """What its axes are, or why it is no recording; an error where just this is asked for."""
+    """Assignment of the axes, or why it is no recording; an error if it is the one requested."""
     try:
         if not isinstance(item, h5py.Dataset):
             raise DataError(f"{path}: {name} is a link, which is not followed; copy what it names")
@@ -136,15 +134,15 @@ _Texts = dict[Place, str]
 """Texts by data set and attribute."""
 
 
-def _texts_apart(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
+def _loose_texts(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
     """Texts of variable length that may declare unit or rate, read by another process.
 
-    They lie in a heap that the HDF5 library believes: damaged, it crashes or never returns.
+    They lie in a heap that the HDF5 library trusts: if damaged, it crashes or never returns.
 
     Raises
     ------
     DataError
-        That is what happens.
+        If that happens.
     """
     asked = [
         (name, key)
@@ -153,19 +151,19 @@ def _texts_apart(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
         if (key in UNIT_NAMES or is_rate_name(key)) and is_loose_text(item.attrs.get_id(key))
     ]
     try:
-        texts = texts_apart(path, asked)
+        texts = texts_by_subprocess(path, asked)
     except ValueError as error:
         raise DataError(f"{path}: {error}; take an intact copy") from error
     return {place: text.strip() for place, text in texts.items()}
 
 
 def refuse_storage(path: Path, name: str, item: Any) -> None:
-    """Refuse what is kept elsewhere, not written, or larger than a piece that can be read.
+    """Refuse data that are kept elsewhere, not written, or in pieces too large to read.
 
     Raises
     ------
     DataError
-        One of these.
+        In any of these cases.
     """
     label = f"{path}: {name}"
     if item.is_virtual or item.external:
@@ -208,7 +206,7 @@ def _fetch(
 
 
 def _text(item: Any, key: str) -> str:
-    """An attribute as text, empty where it is none."""
+    """An attribute as text, empty if it is not a text."""
     value = plain_value(item, key)
     if isinstance(value, bytes):
         return value.decode("utf-8", errors="replace").strip()
@@ -216,7 +214,7 @@ def _text(item: Any, key: str) -> str:
 
 
 def _rate_of(item: Any, texts: Mapping[str, str]) -> RateNote:
-    """Rate of the attributes: one whose name or value says hertz, else a number without a unit."""
+    """Rate from an attribute whose name or value contains Hz, or else a number without a unit."""
     found = RateNote()
     for key in filter(is_rate_name, item.attrs):
         value = plain_value(item, key)
@@ -237,7 +235,7 @@ def mat73_contents(path: Path, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        It is damaged, or the array asked for cannot be one recording.
+        If it is damaged, or the requested array is not a single recording.
     """
     file = _opened(path)
     with closed_on_failure(path, file, HDF5_FAULTS):
@@ -246,7 +244,7 @@ def mat73_contents(path: Path, options: SourceOptions) -> Contents:
 
 
 class _Mat73:
-    """Walk of a MATLAB 7.3 file; counts what it meets, for references may form loops."""
+    """Walk through a MATLAB 7.3 file; objects are counted, since references may form loops."""
 
     def __init__(self, path: Path, file: Any) -> None:
         self.path, self.file, self.count = path, file, 0
@@ -256,7 +254,7 @@ class _Mat73:
         return {name: self._leaf(self.file[name], 0) for name in names}
 
     def _members(self, group: Any) -> list[str]:
-        """Names of what lies in this very file."""
+        """Names of the members stored in this file itself."""
         return [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
 
     def _leaf(self, item: Any, depth: int) -> Leaf:
@@ -264,7 +262,7 @@ class _Mat73:
         if depth > _DEEPEST or self.count > MOST_LEAVES:
             raise DataError(
                 f"{self.path} holds > {MOST_LEAVES} arrays or structs > {_DEEPEST} deep, the most "
-                "believed; split it"
+                "too many; split it"
             )
         if isinstance(item, h5py.Group):
             return self._struct(item, depth)
@@ -289,7 +287,7 @@ class _Mat73:
         return Leaf(shape=shape, kind="numeric", reader=partial(_transposed, self.path, item))
 
     def _struct(self, group: Any, depth: int) -> Leaf:
-        """Fields of a struct; of an array of structs, every field is an array of references."""
+        """Fields of a struct; in an array of structs, every field is an array of references."""
         items = {name: group[name] for name in self._members(group)}
         columns = {
             name: self._followed(item) for name, item in items.items() if _holds_elements(item)
@@ -304,7 +302,7 @@ class _Mat73:
         return Leaf(shape=(1, len(rows)), kind="struct", members=rows)
 
     def _followed(self, item: Any) -> list[Any]:
-        """What the references of a data set point at."""
+        """Targets of the references of a data set."""
         if item.size > MOST_LEAVES:
             raise DataError(
                 f"{self.path}: {item.name} holds {item.size} cells, must be <= {MOST_LEAVES}"
@@ -319,7 +317,7 @@ def _is_reference(item: Any) -> bool:
 
 
 def _holds_elements(item: Any) -> bool:
-    """A cell array says that it is one; the elements of a field do not."""
+    """Whether it is a cell array, which is marked as such; the elements of a field are not."""
     return (
         isinstance(item, h5py.Dataset) and _is_reference(item) and "MATLAB_class" not in item.attrs
     )

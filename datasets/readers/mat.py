@@ -1,4 +1,4 @@
-"""MATLAB files of any level: 4, and 5 to 7, read here; 7.3 being HDF5 inside."""
+"""MATLAB files of any level: 4, and 5 to 7, read here; 7.3 is HDF5 inside."""
 
 from pathlib import Path
 
@@ -10,9 +10,9 @@ from .mat_tree import tree_contents
 
 _HEADER = 128  # byte, of a text and the version
 _HDF5_HEAD = b"\x89HDF\r\n\x1a\n"
-_HDF5_AT = 512  # byte, where MATLAB 7.3 leaves room for the header
+_HDF5_AT = 512  # byte; MATLAB 7.3 leaves this space for the header
 _HDF5_VERSION = (b"\x00\x02IM", b"\x02\x00MI")
-"""Version 2.0 and byte order, at the end of the header: its text may say another level."""
+"""Version 2.0 and byte order, at the end of the header: its text may name another level."""
 
 
 def mat_contents(path: Path, options: SourceOptions) -> Contents:
@@ -21,7 +21,7 @@ def mat_contents(path: Path, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        It is no MATLAB file or damaged.
+        If it is not a MATLAB file or damaged.
     """
     with path.open("rb") as handle:
         head = handle.read(_HDF5_AT + len(_HDF5_HEAD))

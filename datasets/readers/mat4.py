@@ -1,7 +1,7 @@
 """MATLAB 4 files: a header of five integers before every matrix, whose numbers are read in place.
 
-The layout is that of "MAT-File Format" (The MathWorks), level 4: type, rows, columns, whether there
-is an imaginary part, length of the name; then the name, then the numbers, column by column.
+The layout is that of "MAT-File Format" (The MathWorks), level 4: type, rows, columns, imaginary
+flag, length of the name; then the name, then the numbers, column by column.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from .flat import Flat
 from .mat_tree import MOST_LEAVES, Leaf, Tree, fetch_of
 
 _HEADER = 20  # byte
-_LARGEST_TYPE = 5000  # read in the wrong byte order, a type is larger
+_LARGEST_TYPE = 5000  # in the wrong byte order, a type is larger
 _CODES = ("f8", "f4", "i4", "i2", "u2", "u1")
 """Code of the numbers by the tens of the type."""
 
@@ -27,7 +27,7 @@ _LONGEST_TEXT = 4096  # characters
 
 
 def is_mat4(head: bytes) -> bool:
-    """Whether a file that begins so is of level 4: later ones begin with text.
+    """Whether a file with this beginning is of level 4: later ones begin with text.
 
     Examples
     --------
@@ -55,17 +55,17 @@ class _Matrix:
 
     @property
     def end(self) -> int:
-        """Behind its numbers [byte]."""
+        """End of its numbers [byte]."""
         return self.place + (1 + self.imaginary) * self.count * int(self.code[1:])
 
 
 def mat4_tree(path: Path) -> Tree:
-    """Every variable of a MATLAB 4 file.
+    """All variables of a MATLAB 4 file.
 
     Raises
     ------
     DataError
-        It is cut short, or a header holds what cannot be.
+        If it is truncated, or a header has invalid values.
     """
     size = path.stat().st_size
     found: Tree = {}
@@ -74,7 +74,7 @@ def mat4_tree(path: Path) -> Tree:
         while place < size:
             count += 1
             if count > MOST_LEAVES:
-                raise DataError(f"{path} holds > {MOST_LEAVES} arrays, the most believed; split it")
+                raise DataError(f"{path} holds > {MOST_LEAVES} arrays, too many; split it")
             matrix = _matrix(path, handle, place, size)
             found[matrix.name] = _leaf(path, matrix)
             place = matrix.end
@@ -133,7 +133,7 @@ def _leaf(path: Path, matrix: _Matrix) -> Leaf:
 
 
 def _text(layout: Flat) -> str:
-    """Characters, which lie as numbers; empty where they are too many or none."""
+    """Characters, which are stored as numbers; empty if they are too many or invalid."""
     if not 0 < layout.n_samples <= _LONGEST_TEXT:
         return ""
     codes = layout.fetch(0, layout.n_samples, (0,))[0]

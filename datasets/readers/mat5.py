@@ -1,4 +1,4 @@
-"""MATLAB 5 to 7 files: every size checked before it is believed, arrays read in place.
+"""MATLAB 5 to 7 files: every size checked before use, arrays read in place.
 
 The layout is that of "MAT-File Format" (The MathWorks), level 5: elements with a tag of type and
 size; a matrix is an element of elements; a compressed element holds one matrix.
@@ -34,7 +34,7 @@ _LONGEST_TEXT = 4096  # byte, of a text that is a condition
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Bytes:
-    """A stretch of the file, or of what was inflated from it."""
+    """A section of the file, or of decompressed data."""
 
     path: Path
     place: Path | Callable[[], memoryview]
@@ -66,12 +66,12 @@ class _Bytes:
 
 
 def mat5_tree(path: Path) -> Tree:
-    """Every variable of a MATLAB 5 to 7 file.
+    """All variables of a MATLAB 5 to 7 file.
 
     Raises
     ------
     DataError
-        It has no such header, is cut short, inflates beyond :data:`LARGEST_INFLATED`, or an
+        If it has no such header, is truncated, decompresses beyond :data:`LARGEST_INFLATED`, or an
         element contradicts another.
     """
     size = path.stat().st_size
@@ -104,18 +104,18 @@ def mat5_tree(path: Path) -> Tree:
         place += 8 + length
     if not found:
         raise DataError(f"{path} holds 0 variables, must be >= 1; it is cut short")
-    # what MATLAB keeps for function handles has no name
+    # MATLAB's data of function handles have no name
     return {name: leaf for name, leaf in found.items() if name and not name.startswith("__")}
 
 
 def _mapped(path: Path, order: str, place: int, length: int) -> _Bytes:
-    """An uncompressed element, seen through the page cache and not read."""
+    """An uncompressed element, mapped into memory and not read."""
     view = np.memmap(path, dtype=np.uint8, mode="r", offset=place, shape=(length,))
     return _Bytes(path=path, place=path, raw=view.data, offset=place, order=order)
 
 
 def _inflated(path: Path, order: str, place: int, length: int, limit: int) -> _Bytes:
-    """A compressed element; zlib's checksum guards it."""
+    """A compressed element, protected by zlib's checksum."""
     inflater, pieces, total = zlib.decompressobj(), [], 0
     with path.open("rb") as handle:
         handle.seek(place)
@@ -128,9 +128,7 @@ def _inflated(path: Path, order: str, place: int, length: int, limit: int) -> _B
     except zlib.error as error:
         raise damaged(path, error) from error
     if total > limit:
-        raise DataError(
-            f"{path} holds more than {LARGEST_INFLATED} byte, the largest believed; split it"
-        )
+        raise DataError(f"{path} holds more than {LARGEST_INFLATED} byte, too many; split it")
     if not inflater.eof:
         raise DataError(f"{path} ends within a compressed variable; take an intact copy")
     raw = memoryview(b"".join(pieces))
@@ -152,7 +150,7 @@ def _add(found: Tree, matrix: _Bytes) -> None:
 
 
 def _elements(content: _Bytes, most: int) -> list[tuple[int, _Bytes]]:
-    """Type and content of the elements of an element, at most so many."""
+    """Type and content of the elements of an element, at most the given number."""
     found: list[tuple[int, _Bytes]] = []
     place = 0
     while place < len(content.raw) and len(found) < most:
@@ -168,13 +166,12 @@ def _elements(content: _Bytes, most: int) -> list[tuple[int, _Bytes]]:
 
 
 def _matrix(content: _Bytes, depth: int) -> tuple[str, Leaf]:
-    """Name and meaning of one matrix."""
+    """Name and content of one matrix."""
     if depth > _DEEPEST:
         raise DataError(
-            f"{content.path}: structs lie more than {_DEEPEST} deep, the deepest believed; take an "
-            "intact copy"
+            f"{content.path}: structs are nested more than {_DEEPEST} deep; take an intact copy"
         )
-    # at most: flags, dimensions, name, and what the class needs
+    # at most: flags, dimensions, name, and the data of the class
     parts = _elements(content, most=5)
     if len(parts) < 3 or len(parts[0][1].raw) < 8:
         return "", Leaf(shape=(0,), kind="object")

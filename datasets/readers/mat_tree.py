@@ -1,4 +1,4 @@
-"""What a MATLAB file of either kind holds, and the parts it makes: names, shapes, layouts."""
+"""Content of a MATLAB file of any kind, and the parts made of it: names, shapes, layouts."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -15,10 +15,10 @@ POUND_FORCE = 4.4482216152605
 """[N], exact: international pound times standard gravity."""
 
 UNIT_NAMES = ("unit", "units", "Unit", "Units")
-"""Under which files keep the unit of an array."""
+"""Names under which files keep the unit of an array."""
 
 MOST_LEAVES = 10_000
-"""Arrays, fields and cells believed of one file."""
+"""Largest number of arrays, fields and cells in one file."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,15 +28,15 @@ class Leaf:
     Attributes
     ----------
     shape : tuple of int
-        As MATLAB shows it.
+        Shape as in MATLAB.
     kind : str
-        What it is.
+        Kind of content.
     reader : callable, optional
-        Of an array: how to read it, once it is known which axis is which.
+        For an array: function that reads it, given the assignment of its axes.
     text : str
-        Of a short text.
+        Content of a short text.
     members : tuple of mapping
-        Fields of every element of a struct; of a cell array one nameless field.
+        Fields of every element of a struct; for a cell array, one nameless field.
     """
 
     shape: tuple[int, ...]
@@ -51,7 +51,7 @@ class Leaf:
         return math.prod(self.shape)
 
     def scalar(self) -> float | None:
-        """One number, also where the file holds it as text; None where it is none."""
+        """One number, also if stored as text; None for anything else."""
         try:
             if self.kind == "text":
                 return float(self.text)
@@ -68,14 +68,14 @@ Tree = dict[str, Leaf]
 
 
 def fetch_of(column_major: Flat, axes: Axes) -> Fetch:
-    """How an array is read whose first index runs fastest.
+    """Function that reads an array whose first index runs fastest.
 
     Parameters
     ----------
     column_major : Flat
         All its numbers, one after the other.
     axes : Axes
-        Which of its axes is which.
+        Assignment of its axes.
     """
     return replace(
         column_major,
@@ -87,18 +87,18 @@ def fetch_of(column_major: Flat, axes: Axes) -> Fetch:
 
 @dataclass(frozen=True, kw_only=True)
 class MatLayout:
-    """Where a known data set keeps its numbers, all fields of one struct.
+    """Layout of a known data set whose numbers are all fields of one struct.
 
     Attributes
     ----------
     name : str
-        Of the data set, for messages.
+        Name of the data set, for messages.
     struct, signal, sample_rate : str
         Names of the struct and its fields.
     unit : str
         Unit of the signal, by the documentation of the data set.
     conditions : dict
-        Field -> manifest column and factor to SI.
+        Manifest column and factor to SI, by field.
     """
 
     name: str
@@ -128,7 +128,7 @@ def tree_contents(path: Path, tree: Tree, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        A known layout has impossible values, or the array asked for cannot be one recording.
+        If a known layout has impossible values, or the requested array is not a single recording.
     """
     named = dict(_named(path, tree))
     known = None if options.variables else _known(path, tree, options)
@@ -139,21 +139,21 @@ def tree_contents(path: Path, tree: Tree, options: SourceOptions) -> Contents:
             continue
         found = _part(path, name, leaf, options)
         if isinstance(found, FilePart):
-            parts.append(_with_what_is_beside(found, structs))
+            parts.append(_with_sibling_fields(found, structs))
         elif found:
             others.append(found)
     return Contents(parts=tuple([known, *parts] if known else parts), others=tuple(others))
 
 
 def _named(path: Path, tree: Tree) -> Iterator[tuple[str, Leaf]]:
-    """Leaves under the names MATLAB gives them: ``a``, ``s.a``, ``s(2).a``, ``c{3}``."""
+    """Leaves under their MATLAB names: ``a``, ``s.a``, ``s(2).a``, ``c{3}``."""
     count = 0
     queue = list(reversed(tree.items()))
     while queue:
         name, leaf = queue.pop()
         count += 1
         if count > MOST_LEAVES:
-            raise DataError(f"{path} holds > {MOST_LEAVES} arrays, the most believed; split it")
+            raise DataError(f"{path} holds > {MOST_LEAVES} arrays, too many; split it")
         if not leaf.members:
             yield name, leaf
         inner = [
@@ -165,7 +165,7 @@ def _named(path: Path, tree: Tree) -> Iterator[tuple[str, Leaf]]:
 
 
 def _by_struct(named: Mapping[str, Leaf]) -> dict[str, dict[str, Leaf]]:
-    """Leaves by the struct that they are fields of, and by name there."""
+    """Leaves by the struct to which they belong as fields, and by field name."""
     found: dict[str, dict[str, Leaf]] = {}
     for name, leaf in named.items():
         struct, _, key = name.rpartition(".")
@@ -173,8 +173,8 @@ def _by_struct(named: Mapping[str, Leaf]) -> dict[str, dict[str, Leaf]]:
     return found
 
 
-def _with_what_is_beside(part: FilePart, structs: Mapping[str, Mapping[str, Leaf]]) -> FilePart:
-    """An array with the unit that its struct holds, if for it alone, and the nearest rate."""
+def _with_sibling_fields(part: FilePart, structs: Mapping[str, Mapping[str, Leaf]]) -> FilePart:
+    """An array with the unit of its struct, if it is the only array there, and the nearest rate."""
     struct = part.name.rpartition(".")[0]
     beside = structs[struct]
     arrays = [leaf for leaf in beside.values() if leaf.kind == "numeric" and leaf.size > 1]
@@ -187,7 +187,7 @@ def _with_what_is_beside(part: FilePart, structs: Mapping[str, Mapping[str, Leaf
 
 
 def _nearest_rate(struct: str, structs: Mapping[str, Mapping[str, Leaf]]) -> RateNote:
-    """Of the struct, else of the one that holds it, and so on."""
+    """Rate of the struct, or else of the one that contains it, and so on."""
     while True:
         for key, leaf in structs.get(struct, {}).items():
             told = rate_note(key, leaf.text or leaf.scalar()) if is_rate_name(key) else RateNote()
@@ -205,7 +205,7 @@ def _member(name: str, leaf: Leaf, index: int, key: str) -> str:
 
 
 def _part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> FilePart | str:
-    """A part; or words about what it is instead, none about single numbers and texts."""
+    """A part; or a description of what it is instead, empty for single numbers and texts."""
     asked = name in options.variables
     if leaf.kind != "numeric" or leaf.size <= 1:
         if asked:
@@ -228,9 +228,9 @@ def array_part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> Fil
     Raises
     ------
     DataError
-        Its shape is none of a recording.
+        If its shape is not that of a recording.
     """
-    # trailing sides of one element are none
+    # trailing axes of one element do not count
     shape = leaf.shape[:2] + tuple(n for n in leaf.shape[2:] if n != 1)
     if len(shape) != 2:
         raise DataError(
@@ -270,7 +270,7 @@ def _by_layout(
         if name in fields
     }
     faults = [
-        f"{path}: {name} = {leaf.text or leaf.shape!r} must be one number; mend the file"
+        f"{path}: {name} = {leaf.text or leaf.shape!r} must be one number; correct the file"
         for name, (value, leaf) in numbers.items()
         if value is None
     ]

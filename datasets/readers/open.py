@@ -1,8 +1,8 @@
 """Measured recordings in files of many formats: one reader per suffix, one way to open them all.
 
-A reader lists what a file holds (:class:`~.source.part.Contents`); here one part is chosen, and
-rate, channels and units are settled between file and caller. Units are declared by the file or
-by the caller and converted, or refused; they are never guessed from the numbers.
+A reader lists the content of a file (:class:`~.source.part.Contents`); here one part is chosen, and
+rate, channels and units are determined from file and caller. Units are declared by the file or by
+the caller and converted, or refused; they are never guessed from the numbers.
 """
 
 from collections.abc import Callable
@@ -26,16 +26,16 @@ from .wav import wav_contents
 
 @dataclass(frozen=True, kw_only=True)
 class Reader:
-    """How one format is read.
+    """Reader of one format.
 
     Attributes
     ----------
     name : str
-        Of the format.
+        Name of the format.
     contents : callable
-        Lists what a file holds.
+        Lists the content of a file.
     options : frozenset of str
-        Options beyond those of every format that it understands.
+        Options that it supports beyond those common to all.
     """
 
     name: str
@@ -77,32 +77,32 @@ READERS: dict[str, Reader] = {
     ".bin": _RAW,
     ".raw": _RAW,
 }
-"""Suffix -> reader; a declared ``dtype`` makes any file headerless binary."""
+"""Readers by suffix; a declared ``dtype`` makes any file headerless binary."""
 
 
 def open_source(path: str | Path, options: SourceOptions | None = None) -> Source:
-    r"""Open the one recording of a file, or the one that the options choose.
+    r"""Open the only recording of a file, or the one chosen by the options.
 
     Parameters
     ----------
     path : str or Path
         WAV, MATLAB 4 to 7.3, CSV/TSV, HDF5, NPY, NPZ, UFF58, TDMS, or headerless binary.
     options : SourceOptions, optional
-        What the file does not declare, and what of it is wanted.
+        Declarations that the file lacks, and the selection to read.
 
     Returns
     -------
     Source
-        To be closed. A rate that the file prints with few digits, as a step or as times, is the
-        whole number of hertz that they allow, where they allow just one. Rate and units that
-        nobody declares are None and named in `undeclared`.
+        Source, which must be closed. A rate printed with few digits, as a step or as times, is
+        rounded to a whole number of hertz if the digits allow just one. Undeclared rate and units
+        are None and listed in `undeclared`.
 
     Raises
     ------
     DataError
-        The file is missing, damaged or of a format not known; it holds several recordings and
-        none is chosen (with the list of what is inside); an option does not fit it, contradicts
-        what it declares, or names what it does not hold.
+        If the file is missing, damaged or of unknown format; it holds several recordings and none
+        is chosen (the message lists the content); or an option does not fit it, contradicts its
+        declarations, or names something that it does not hold.
 
     Examples
     --------
@@ -125,12 +125,12 @@ def open_source(path: str | Path, options: SourceOptions | None = None) -> Sourc
 
 
 def open_records(path: str | Path, options: SourceOptions | None = None) -> tuple[Source, ...]:
-    """Open all records of a file: its rows where they are records, else the one there is.
+    """Open all records of a file: its rows if they are records, or else its only recording.
 
     Parameters
     ----------
     path, options
-        As for :func:`open_source`; `record` is left aside where rows are records.
+        As for :func:`open_source`; `record` is ignored if rows are records.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def open_records(path: str | Path, options: SourceOptions | None = None) -> tupl
     Raises
     ------
     DataError
-        As :func:`open_source`.
+        As for :func:`open_source`.
 
     Examples
     --------
@@ -174,12 +174,12 @@ def _opened(file: Path, contents: Contents, given: SourceOptions, record: int) -
 
 
 def list_sources(path: str | Path, options: SourceOptions | None = None) -> tuple[Source, ...]:
-    """Everything in a file that could be a recording, for listings; all to be closed.
+    """All possible recordings of a file, for listings; they must be closed.
 
     Parameters
     ----------
     path, options
-        As for :func:`open_source`; `channels`, `variable` and what is per channel are left aside.
+        As for :func:`open_source`; `channels`, `variable` and options per channel are ignored.
 
     Returns
     -------
@@ -189,7 +189,7 @@ def list_sources(path: str | Path, options: SourceOptions | None = None) -> tupl
     Raises
     ------
     DataError
-        The file is missing, damaged or of a format not known.
+        If the file is missing, damaged or of unknown format.
 
     Examples
     --------

@@ -34,7 +34,7 @@ _BIG_ENDIAN = 1 << 6
 _MOST_CHANNELS = 10_000
 _UNITS = ("unit_string", "NI_UnitDescription")
 _SHORT = ("Last segment ", "Data size ", "Cropping data ")
-"""How the library's warnings begin that are about samples missing, and no more than that."""
+"""Beginnings of the library's warnings that are only about missing samples."""
 
 
 def tdms_contents(path: Path, options: SourceOptions) -> Contents:
@@ -43,8 +43,8 @@ def tdms_contents(path: Path, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        The library is not installed; the file is no TDMS or damaged; it is cut short, unfinished
-        or holds fewer samples than it declares, unless `partial` asks for those.
+        If the library is not installed; the file is not TDMS or damaged; or it is truncated,
+        unfinished or holds fewer samples than declared, unless `partial` is set.
     """
     try:
         nptdms: Any = importlib.import_module("nptdms")
@@ -53,7 +53,7 @@ def tdms_contents(path: Path, options: SourceOptions) -> Contents:
             f"{path} needs nptdms, which is not installed; pip install 'wearstate[tdms]'"
         ) from None
     _walk_segments(path, options.partial)
-    # opened here: the library would believe an index file beside it, which may be another's
+    # opened here: the library would use an index file next to it, which may belong to another
     handle = _Bounded(io.FileIO(path))
     # the library raises errors of any type on damaged bytes
     with closed_on_failure(path, handle, Exception), _no_warning(path, options.partial):
@@ -63,10 +63,10 @@ def tdms_contents(path: Path, options: SourceOptions) -> Contents:
 
 
 class _Bounded(io.BufferedReader):
-    """A file that never sets memory aside for more than it holds, whatever length is declared."""
+    """A file that never reserves memory for more than it holds, whatever length is declared."""
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Bytes from here, at most to the end."""
+        """Bytes from the current position, at most to the end."""
         if size is None or size < 0:
             return super().read()
         left = os.fstat(self.fileno()).st_size - self.tell()
@@ -75,7 +75,7 @@ class _Bounded(io.BufferedReader):
 
 @contextmanager
 def _no_warning(path: Path, partial: bool) -> Iterator[None]:
-    """What the library only warns of on its console is damage, or else samples that are missing."""
+    """Treat the library's console warnings as damage, or else as missing samples."""
     console = importlib.import_module("nptdms.log").log_manager.console_handler
 
     def refuse(record: logging.LogRecord) -> bool:
@@ -86,7 +86,7 @@ def _no_warning(path: Path, partial: bool) -> Iterator[None]:
                 f"{path} holds fewer samples than it declares ({record.getMessage()}); take an "
                 "intact copy, or read what is there with partial"
             )
-        # at the first one: a forged length would have it warn, and keep texts, a million times
+        # at the first one: a forged length would cause a million warnings, all kept in memory
         raise damaged(path, ValueError(record.getMessage()))
 
     console.addFilter(refuse)
@@ -97,7 +97,7 @@ def _no_warning(path: Path, partial: bool) -> Iterator[None]:
 
 
 def _walk_segments(path: Path, partial: bool) -> None:
-    """Every segment must lie within the file and end where the next begins; not the last, cut."""
+    """Every segment must lie within the file and end where the next begins; the last may be cut."""
     size, place = path.stat().st_size, 0
     with path.open("rb") as handle:
         if handle.read(4) != b"TDSm":
@@ -152,7 +152,7 @@ def _groups(path: Path, file: Any, size: int, partial: bool) -> Contents:
 
 
 def _dtype(channel: Any) -> np.dtype[Any] | None:
-    """Type of stored real numbers, None of anything else."""
+    """Type of stored real numbers, None for anything else."""
     stored = getattr(channel.data_type, "nptype", None)
     if stored is None or channel.data_type.__name__ == "DaqMxRawData":
         return np.dtype("f8") if channel.data_type.__name__ == "DaqMxRawData" else None
@@ -160,7 +160,7 @@ def _dtype(channel: Any) -> np.dtype[Any] | None:
 
 
 def _missing(file: Any) -> dict[str, int]:
-    """Samples that the last segment lacks, by path of the channel."""
+    """Number of samples missing in the last segment, by path of the channel."""
     lacking = file.file_status.channel_statuses or {}
     return {path: max(s.expected_length - s.read_length, 0) for path, s in lacking.items()}
 
@@ -168,9 +168,10 @@ def _missing(file: Any) -> dict[str, int]:
 def _group_parts(
     path: Path, group: str, channels: Sequence[Any], missing: Mapping[str, int]
 ) -> list[FilePart]:
-    """One part of channels that fit together; else one of each.
+    """One part of channels that fit together; otherwise one for each.
 
-    They fit by the samples that they declare; of those cut short, the shortest gives the length.
+    They fit if they declare the same number of samples; if truncated, the shortest gives the
+    length.
     """
     rates = [_rate(path, channel) for channel in channels]
     whole = [len(channel) + missing.get(channel.path, 0) for channel in channels]
@@ -192,7 +193,7 @@ def _group_part(path: Path, name: str, members: Sequence[Any], declared: int) ->
         n_samples=n_samples,
         fetch=partial(_fetch, path, tuple(members), n_samples < declared),
         sample_rate=_rate(path, members[0]),
-        # the step is a double, its inverse need not be
+        # the step is a double, its inverse need not be representable
         rate_doubt=4 * float(np.finfo(float).eps),
         conditions={DECLARED: float(declared)} if n_samples < declared else {},
     )

@@ -1,4 +1,4 @@
-"""CSV, TSV and other columns of numbers, read in pieces by an index of their lines."""
+"""CSV, TSV and other columns of numbers, read in pieces through an index of their lines."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -33,31 +33,31 @@ from .text_dialect import (
 )
 from .text_lines import LONGEST_ROW, Lines, index_lines
 
-_HEAD = 2**18  # byte, looked at to find header and separators
+_HEAD = 2**18  # byte, examined for header and separators
 
-_FEWEST_ROWS = 3  # that are looked at, header or not
+_FEWEST_ROWS = 3  # needed for the detection, with or without header
 
 _TIME_NAME = re.compile(r"(?:time|t|zeit|timestamp)(?:_(s|ms|us))?", re.IGNORECASE)
 _UNIT_BEHIND = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*")
 
 
 def text_contents(path: Path, options: SourceOptions) -> Contents:
-    """Columns of numbers under a header or none.
+    """Columns of numbers with or without a header.
 
-    Separators, decimal sign, header, units ("acc [g]") and the column of times are found where
-    only one reading is possible, and asked for where there are several. Columns that hold words
-    are left out; numbers in an unknown notation are named, to be refused where they are wanted.
+    Separators, decimal mark, header, units ("acc [g]") and the time column are detected if only one
+    reading is possible; otherwise an error asks for them. Columns of words are left out; numbers in
+    an unknown notation are reported, and refused if they are requested.
 
     Raises
     ------
     DataError
-        It is binary, empty, has no or several readings, lines of different length, a cell that is
-        no number, or times that are not even.
+        If it is binary or empty, has no or several readings, lines of different length, a cell that
+        is not a number, or uneven times.
     """
     records = options.rows is not None
     head = head_of(path, LONGEST_ROW if records else _HEAD)
     lines = head.split("\n")
-    if records:  # long ones: a few tell the layout
+    if records:  # long ones: a few show the layout
         fits = np.cumsum([len(line) for line in lines]) <= _HEAD
         lines = lines[: max(_FEWEST_ROWS, int(np.count_nonzero(fits)))]
     dialect = dialect_of(path, lines, options)
@@ -72,7 +72,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
     rate, doubt, note = _rate(path, table, columns, time, options)
     kept = [c for c in dialect.numeric if c != time]
     if not kept:
-        raise DataError(f"{path} has no column of numbers beside the time; add one")
+        raise DataError(f"{path} has no column of numbers besides the time; add one")
     if len(kept) > MOST_CHANNELS:
         raise DataError(f"{path} has {len(kept)} columns, must have <= {MOST_CHANNELS}; split it")
     named = any(column.named for column in columns)
@@ -94,7 +94,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
 
 
 def _unread(table: "TextTable", columns: Sequence["_Column"], time: int | None) -> dict[str, str]:
-    """Columns whose last cells are numbers in a notation that is not read, and what to do."""
+    """Columns whose last cells are numbers in an unsupported notation, and the cure."""
     first = max(0, table.lines.count - SAMPLE_LINES)
     found = {}
     for index, column in enumerate(columns):
@@ -111,7 +111,7 @@ def _unread(table: "TextTable", columns: Sequence["_Column"], time: int | None) 
 
 
 def _line_records(path: Path, table: "TextTable", options: SourceOptions) -> Contents:
-    """Lines as recordings of one channel; columns that hold words are left out."""
+    """Lines as recordings of one channel; columns of words are left out."""
     if options.time_column:
         raise DataError(
             f"{path}: time_column = {options.time_column!r} must not be given with rows = "
@@ -149,7 +149,7 @@ class _Column:
 def _columns(
     path: Path, lines: list[str], dialect: Dialect, options: SourceOptions
 ) -> list[_Column]:
-    """Name and unit of every column, by the header's last line or two."""
+    """Name and unit of every column, from the last one or two header lines."""
     del path, options
     above = [i for i in range(dialect.first) if lines[i].strip(" \t\r")]
     alone = dialect.n_columns == 1  # then a blank belongs to the name
@@ -178,8 +178,8 @@ def _columns(
 
 
 def _unit_row(cells: Sequence[str]) -> list[str | None] | None:
-    """Units of a line that holds nothing else."""
-    # a dash is no unit, as in the cell of a counter
+    """Units in a line that holds nothing else."""
+    # a dash is not a unit, as in the cell of a counter
     bare = ["" if text == "-" else text for text in (cell.strip("[]() ") for cell in cells)]
     if not any(bare) or not all(_is_unit(cell) for cell in bare if cell):
         return None
@@ -195,7 +195,7 @@ def _named(cell: str, index: int) -> _Column:
     name, unit = cell, None
     if match is not None:
         square, round_ = match.group(2), match.group(3)
-        # what stands in round brackets may be a part of the name
+        # round brackets may be part of the name
         if square is not None or (round_ is not None and _is_unit(round_.strip())):
             name, unit = match.group(1), (square or round_ or "").strip()
     return _Column(name=name or f"column_{index + 1}", unit=unit or None, named=True)
@@ -234,7 +234,7 @@ def _time_column(
             )
         return names.index(wanted)
     found = [i for i, c in enumerate(columns) if c.named and _TIME_NAME.fullmatch(c.name)]
-    # of a date and a time each in its column, the latter has the name
+    # if date and time have separate columns, the latter is so named
     found = found if len(found) == 1 else list(stamped)
     return found[0] if len(found) == 1 else None
 
@@ -246,7 +246,7 @@ def _rate(
     time: int | None,
     options: SourceOptions,
 ) -> tuple[float | None, float, str]:
-    """Sample rate, its relative doubt, and why there is none."""
+    """Sample rate, its relative uncertainty, and why there is none."""
     if time is None:
         return None, 0.0, ""
     column = columns[time]
@@ -262,7 +262,7 @@ def _rate(
         place=partial(_place, table, time),
     )
     match = _TIME_NAME.fullmatch(column.name)
-    # a unit for all other channels is none for the times
+    # a unit for all other channels does not apply to the times
     named = isinstance(options.unit, Mapping) and column.name in list(options.unit)
     given = options.per_channel("unit", column.name) if named else None
     unit = given or column.unit or (match and match.group(1))
@@ -281,7 +281,7 @@ def _rate(
 def _stamped_rate(
     path: Path, table: "TextTable", column: _Column, time: int, options: SourceOptions
 ) -> tuple[float, float]:
-    """Sample rate by time stamps, and its relative doubt."""
+    """Sample rate from time stamps, and its relative uncertainty."""
     if isinstance(options.unit, Mapping) and column.name in list(options.unit):
         raise DataError(
             f"{path}: unit {options.unit[column.name]!r} of column {column.name!r} must not be "
@@ -292,7 +292,7 @@ def _stamped_rate(
         return DataError(
             f"{path}: column {column.name!r} is {text[:40]!r} in line "
             f"{table.lines.before + index + 1}, must be a number or a time stamp like "
-            "'2024-05-01T12:00:00.123' or '12:00:00.123' to give the time; mend it, or give "
+            "'2024-05-01T12:00:00.123' or '12:00:00.123' to give the time; correct it, or give "
             "time_column = 0 and fs"
         )
 
@@ -317,20 +317,20 @@ def _stamped_rate(
 
 
 def _place(table: "TextTable", time: int, index: int) -> str:
-    """A time as it is printed, and its line."""
+    """A time as printed, and its line."""
     [text] = table.cells(index, index + 1, time)
     return f"{text} (line {table.lines.before + index + 1})"
 
 
 def _refuse_other_step(path: Path, name: str, step: float, fs: float) -> None:
-    """Refuse a rate that times without a unit fit in none."""
+    """Refuse a rate that contradicts times without a unit, in any unit."""
     rates = {unit: 1.0 / (step * factor) for unit, factor in UNITS["time"].items()}
     if any(abs(rate / fs - 1) <= _RATE_DOUBT for rate in rates.values()):
         return
-    told = ", ".join(f"{rate:.6g} Hz if in {unit}" for unit, rate in rates.items())
+    fitting = ", ".join(f"{rate:.6g} Hz if in {unit}" for unit, rate in rates.items())
     raise DataError(
         f"{path}: fs = {fs:.10g} Hz must fit the times of column {name!r}, whose step {step:.6g} "
-        f"says {told}; correct fs, or give time_column = 0 if the times are wrong"
+        f"means {fitting}; correct fs, or give time_column = 0 if the times are wrong"
     )
 
 
@@ -341,7 +341,7 @@ _RATE_DOUBT = 0.01  # of a rate against times that may be printed coarsely
 
 @dataclass(frozen=True, kw_only=True)
 class TextTable:
-    """Lines and how to read them."""
+    """Lines and their layout."""
 
     lines: Lines
     dialect: Dialect
@@ -352,7 +352,7 @@ class TextTable:
         Raises
         ------
         DataError
-            A line has another number of cells, or one that is no number.
+            If a line has another number of cells, or one that is not a number.
         """
         rows = self.lines.read(start, stop)
         decimal_comma = self.dialect.decimal == ","
@@ -379,7 +379,7 @@ class TextTable:
         Raises
         ------
         DataError
-            A line has another number of cells.
+            If a line has another number of cells.
         """
         text = [row.decode(BYTES) for row in self.lines.read(start, stop)]
         rows = [split_cells(line, self.dialect.delimiter) for line in text]
@@ -393,22 +393,22 @@ class TextTable:
             cells = split_cells(line, self.dialect.delimiter)
             if len(cells) != width:
                 return DataError(
-                    f"{path}: line {number} has {len(cells)} cell(s), must have {width}; mend it"
+                    f"{path}: line {number} has {len(cells)} cell(s), must have {width}; correct it"
                 )
             for column in columns:
                 if not NUMBER_TEXT.fullmatch(cells[column]):
                     return DataError(
                         f"{path}: column {column + 1} of line {number} is {cells[column][:40]!r}, "
-                        "must be a number; mend it"
+                        "must be a number; correct it"
                     )
         first = self.lines.before + start + 1
         last = first + len(text) - 1
-        return DataError(f"{path}: lines {first} to {last} cannot be read; mend them")
+        return DataError(f"{path}: lines {first} to {last} cannot be read; correct them")
 
 
 def _refuse_widths(text: Sequence[str], dialect: Dialect) -> None:
-    """Lines that are too long would pass unseen where only some columns are read."""
-    if not all(line.strip() for line in text):  # skipped, it would shift all that follow
+    """Refuse lines that are too long, which would go unnoticed if only some columns are read."""
+    if not all(line.strip() for line in text):  # if skipped, all following lines would shift
         raise ValueError
     if dialect.delimiter == " ":
         bad = any(len(line.split()) != dialect.n_columns for line in text)

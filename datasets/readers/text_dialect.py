@@ -1,4 +1,4 @@
-"""How a text of columns is written: encoding, header, delimiter, decimal comma."""
+"""Layout of a text of columns: encoding, header, delimiter, decimal comma."""
 
 import csv
 import re
@@ -37,7 +37,7 @@ _DELIMITERS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Dialect:
-    """How a line is cut into numbers.
+    """How to split a line into numbers.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Dialect:
     decimal : str
         ``.`` or ``,``.
     n_columns : int
-        Cells of every line.
+        Number of cells in every line.
     numeric : tuple of int
         Columns that hold numbers.
     first : int
@@ -62,23 +62,23 @@ class Dialect:
 
 BYTES = "latin-1"  # every byte is a character: nothing is lost, nothing fails
 
-_BOMS = re.compile("(?:\xef\xbb\xbf){0,8}")  # some programs put another one before it
+_BOMS = re.compile("(?:\xef\xbb\xbf){0,8}")  # some programs write several
 
 
 def byte_order_mark(path: Path) -> int:
-    """Bytes of the mark of an encoding at the beginning of a file."""
+    """Number of bytes of the encoding mark at the beginning of a file."""
     with path.open("rb") as handle:
         return _boms(handle.read(24).decode(BYTES))
 
 
 def _boms(text: str) -> int:
-    """Byte of the marks that a text begins with."""
+    """Number of bytes of the marks at the beginning of a text."""
     match = _BOMS.match(text)
     return match.end() if match else 0
 
 
 def head_of(path: Path, size: int) -> str:
-    """First lines, one character a byte; the last one is whole or left out."""
+    """First lines, one character per byte; the last one is complete or left out."""
     with path.open("rb") as handle:
         raw = handle.read(size)
         whole = not handle.read(1)
@@ -117,7 +117,7 @@ def _looks_binary(raw: bytes) -> bool:
 
 
 def header_words(text: str) -> str:
-    """A header in the encoding it is in: UTF-8, else that of old Windows programs."""
+    """A header in its encoding: UTF-8, or else that of old Windows programs."""
     raw = text.encode(BYTES)
     try:
         return raw.decode("utf-8")
@@ -143,13 +143,13 @@ def _quoted(line: str, delimiter: str) -> list[str]:
 
 
 def dialect_of(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
-    """Delimiter, decimal mark and first row of a text, or why these cannot be told."""
+    """Delimiter, decimal mark and first row of a text, or an error if they are ambiguous."""
     found, broken = [], []
     for delimiter in _delimiters(path, lines, options):
         for decimal in (options.decimal,) if options.decimal else (".", ","):
             try:
                 dialect = _tried(path, lines, delimiter, decimal, options)
-            except DataError as error:  # of this reading; another may fit
+            except DataError as error:  # in this reading; another may fit
                 broken.append(error)
                 continue
             if decimal != delimiter and dialect is not None:
@@ -165,7 +165,7 @@ def dialect_of(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
     if not clean:
         raise DataError(
             f"{path} has no columns of numbers that all of its lines share; give delimiter, "
-            "decimal and header, or mend it"
+            "decimal and header, or correct it"
         )
     if len(clean) > 1:
         ways = " or ".join(
@@ -178,7 +178,7 @@ def dialect_of(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
 
 
 def _may_be(lines: list[str], dialect: Dialect, options: SourceOptions) -> bool:
-    """One column with decimal commas may as well be two, unless a header of one name is there."""
+    """Whether one column with decimal commas may also be two; not with a header of one name."""
     if options.decimal is not None or dialect.decimal == "." or dialect.n_columns > 1:
         return True
     comma = any("," in line for line in lines[dialect.first :])
@@ -186,12 +186,12 @@ def _may_be(lines: list[str], dialect: Dialect, options: SourceOptions) -> bool:
 
 
 def _all_pairs(lines: list[str]) -> bool:
-    """Every line can be read both ways: the error that follows names them."""
+    """Whether every line can be read both ways: the error that follows names them."""
     return all(line.count(",") == 1 for line in lines)
 
 
 def _distinct(lines: list[str], dialects: Sequence[Dialect]) -> list[Dialect]:
-    """Readings of which no two give the same numbers."""
+    """Readings, with only one of those that give the same numbers."""
     found: dict[str, Dialect] = {}
     for d in dialects:
         cells = [split_cells(line, d.delimiter) for line in lines[d.first :][-SAMPLE_LINES:]]
@@ -205,15 +205,15 @@ def _plain(cell: str, decimal: str) -> float:
 
 
 def _fits_header(lines: list[str], dialect: Dialect) -> bool:
-    """Whether the line above the numbers has a name for every column, and none left over."""
+    """Whether the line above the numbers has exactly one name for every column."""
     above = next((line for line in reversed(lines[: dialect.first]) if line.strip()), "")
-    # a comma between names says what commas are for
+    # a comma between names shows the meaning of commas
     clear = not (dialect.decimal == "," and dialect.delimiter == " " and "," in above)
     return clear and len(split_cells(above, dialect.delimiter)) == dialect.n_columns
 
 
 def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: SourceOptions) -> None:
-    """A line of numbers that is broken must not pass as the end of the header."""
+    """Refuse a broken line of numbers that would pass as the end of the header."""
     if options.header is not None:
         return
     for number, line in enumerate(lines[: dialect.first], start=1):
@@ -224,7 +224,7 @@ def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: Sour
         if count and 2 * count >= len(cells):
             raise DataError(
                 f"{path}: line {number} holds numbers but reads unlike those below line "
-                f"{dialect.first}; mend it, or give header, the lines before the numbers"
+                f"{dialect.first}; correct it, or give header, the lines before the numbers"
             )
     for number, line in enumerate(lines[dialect.first :], start=dialect.first + 1):
         cells = split_cells(line, dialect.delimiter)
@@ -232,14 +232,14 @@ def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: Sour
             if column not in dialect.numeric and _is_number(cell, dialect.decimal):
                 raise DataError(
                     f"{path}: column {column + 1} is {cell!r} in line {number} and no number in "
-                    f"line {len(lines)}, must be one kind; mend it"
+                    f"line {len(lines)}, must be one kind; correct it"
                 )
 
 
 def _refuse_numbered(
     path: Path, lines: list[str], dialect: Dialect, options: SourceOptions
 ) -> None:
-    """A first line that counts the columns may name them, or be the first sample."""
+    """Refuse a first line of column numbers, which may be names or the first sample."""
     if options.header is not None or options.rows or dialect.first or dialect.n_columns < 2:
         return
     cells = [split_cells(line, dialect.delimiter) for line in lines[:SAMPLE_LINES]]
@@ -250,7 +250,7 @@ def _refuse_numbered(
         return  # whole numbers like those below
     steps = np.diff([_plain(row[0], dialect.decimal) for row in cells[:4]])
     if steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3):
-        return  # times that go on from the first line
+        return  # times that continue from the first line
     told = dialect.delimiter.join(cells[0])[:40]
     raise DataError(
         f"{path}: line 1, {told!r}, may name the columns by number or be a sample; give header, "
@@ -268,7 +268,7 @@ def _delimiters(path: Path, lines: list[str], options: SourceOptions) -> Sequenc
             )
         return (delimiter,)
     tail = "\n".join(lines[-SAMPLE_LINES:])
-    # blanks separate only where nothing clearer does
+    # blanks separate only if nothing clearer does
     return [d for d in (";", "\t", "|", ",") if d in tail] + [" "] * (
         not any(d in tail for d in ";\t|")
     )
@@ -281,7 +281,7 @@ def _is_number(cell: str, decimal: str) -> bool:
 def _tried(
     path: Path, lines: list[str], delimiter: str, decimal: str, options: SourceOptions
 ) -> Dialect | None:
-    """One reading, where the last lines of the head share it."""
+    """One reading, if the last lines of the head agree with it."""
     begin = 0 if options.header is None else options.header
     if begin >= len(lines):
         raise DataError(
@@ -306,7 +306,7 @@ def _tried(
 def _first_line(
     path: Path, lines: list[str], delimiter: str, decimal: str, width: int, numeric: Sequence[int]
 ) -> int:
-    """Index of the first line of numbers, upwards from the last one of the head."""
+    """Index of the first line of numbers, searched upwards from the last one of the head."""
     first = len(lines)
     while first > 0:
         cells = split_cells(lines[first - 1], delimiter)
@@ -316,6 +316,6 @@ def _first_line(
     if first > MOST_HEADER:
         raise DataError(
             f"{path}: line {first} does not read like those below it, and {first} lines are no "
-            f"header, must be <= {MOST_HEADER}; mend the line, or give header"
+            f"header, must be <= {MOST_HEADER}; correct the line, or give header"
         )
     return first

@@ -1,4 +1,4 @@
-"""Lines of a text file by an index: where each begins, in pieces, whatever its length."""
+"""Index of the lines of a text file: their positions, found in pieces, for any file length."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from ...sim.output.recording import DataError
 
 BLOCK = 4096
-"""Lines between two places of the index."""
+"""Number of lines between two entries of the index."""
 
 _LONGEST_LINE = 2**16  # byte
-LONGEST_ROW = 2**23  # byte, where a line is a record
+LONGEST_ROW = 2**23  # byte, if a line is a record
 
 MOST_HEADER = 200  # lines
 _PIECE = 2**22  # byte, read at once
@@ -20,20 +20,20 @@ _PIECE = 2**22  # byte, read at once
 
 @dataclass(frozen=True, kw_only=True)
 class Lines:
-    """Places of every :data:`BLOCK`-th line of numbers in a file.
+    """Positions of every :data:`BLOCK`-th line of numbers in a file.
 
     Attributes
     ----------
     path : Path
         The file.
     places : numpy.ndarray
-        Of line 0, BLOCK, … and of the end [byte].
+        Positions of line 0, BLOCK, … and of the end [byte].
     count : int
-        Lines.
+        Number of lines.
     before : int
-        Lines of the file that precede, for messages.
+        Number of preceding lines in the file, for messages.
     block : int
-        Lines between two places.
+        Number of lines between two positions.
     """
 
     path: Path
@@ -43,7 +43,7 @@ class Lines:
     block: int = BLOCK
 
     def read(self, start: int, stop: int) -> list[bytes]:
-        """Lines [start, stop), fewer where the file has shrunk."""
+        """Lines [start, stop), fewer if the file has shrunk."""
         first = start // self.block
         last = min(-(-stop // self.block), len(self.places) - 1)
         with self.path.open("rb") as handle:
@@ -55,14 +55,14 @@ class Lines:
 def index_lines(
     path: Path, begin: int, before: int, end: int | None = None, *, records: bool = False
 ) -> Lines:
-    """Index the lines of a file from a place on; blank ones at its end are left out.
+    """Index the lines of a file from a position on; blank ones at its end are left out.
 
-    Where lines are `records` they are long, and each has its place.
+    If lines are `records`, they are long, and every line has an entry.
 
     Raises
     ------
     DataError
-        A line is longer than any table's.
+        If a line is too long for a table.
     """
     stop = _end_of_text(path, begin) if end is None else end
     block, longest = (1, LONGEST_ROW) if records else (BLOCK, _LONGEST_LINE)
@@ -83,7 +83,7 @@ def index_lines(
             last = int(ends[-1]) if len(ends) else last
             place += len(raw)
     if last < stop:
-        count += 1  # the last line has no end
+        count += 1  # the last line has no line end
     if places[-1] == stop and len(places) > 1:
         places.pop()
     return Lines(
@@ -100,7 +100,7 @@ def _refuse_long(path: Path, number: int, lengths: NDArray[np.int64], longest: i
 
 
 def _end_of_text(path: Path, begin: int) -> int:
-    """Behind the last line that is neither blank nor a comment."""
+    """Position after the last line that is neither blank nor a comment."""
     end = _end_of_ink(path, begin, path.stat().st_size)
     for _ in range(MOST_HEADER):
         start = _start_of_comment(path, begin, end)
@@ -114,7 +114,7 @@ COMMENT_MARKS = (b"#", b"%")
 
 
 def _start_of_comment(path: Path, begin: int, end: int) -> int | None:
-    """Place of the last line where it is a comment and not the only one."""
+    """Position of the last line if it is a comment and not the only line."""
     with path.open("rb") as handle:
         place = max(begin, end - _LONGEST_LINE)
         handle.seek(place)
@@ -124,7 +124,7 @@ def _start_of_comment(path: Path, begin: int, end: int) -> int | None:
 
 
 def _end_of_ink(path: Path, begin: int, end: int) -> int:
-    """Behind the last line before an end that is not blank."""
+    """Position after the last non-blank line before an end."""
     with path.open("rb") as handle:
         while end > begin:
             size = min(_PIECE, end - begin)

@@ -1,8 +1,8 @@
 """Universal file format, data set 58: time records in ASCII or binary, read in pieces.
 
-Read here and not through a library: those that exist hold the whole file in memory, and end a
-binary set where its numbers happen to look like the end mark. The layout is that of the SDRL
-description of data sets 58, 58b and 164.
+Implemented here because existing libraries hold the whole file in memory and end a binary set at
+numbers that happen to look like the end mark. The layout is that of the SDRL description of data
+sets 58, 58b and 164.
 """
 
 import math
@@ -41,7 +41,7 @@ _KINDS = {
 }
 _AXES = {1: "X", 2: "Y", 3: "Z", 4: "RX", 5: "RY", 6: "RZ"}
 _SI = {8: "m", 11: "m/s", 12: "m/s^2", 9: "N", 13: "N", 15: "Pa"}
-"""Unit of a quantity in SI, by the code of specific data types."""
+"""SI unit of a quantity by the code of specific data types."""
 
 _LENGTH_POWER = {8: 1, 11: 1, 12: 1, 9: 0, 13: 0, 15: -2}
 _FORCE_POWER = {8: 0, 11: 0, 12: 0, 9: 1, 13: 1, 15: 1}
@@ -54,7 +54,7 @@ _Run = Callable[[int, int], NDArray[np.float64]]
 
 @dataclass(frozen=True, kw_only=True)
 class _Set:
-    """One data set 58: its header, and where its numbers lie."""
+    """One data set 58: its header, and the location of its numbers."""
 
     name: str
     unit: str
@@ -79,19 +79,19 @@ class _Set:
 
     @property
     def per_sample(self) -> int:
-        """Numbers stored for a sample: an uneven one has its time before it."""
+        """Numbers stored per sample: an unevenly spaced one is preceded by its time."""
         return 1 if self.even else 2
 
     @property
     def widths(self) -> tuple[int, ...]:
-        """Characters of the numbers of a line."""
+        """Widths of the numbers of a line [characters]."""
         if not self.double:
             return (_SINGLE,) * 6
         return (_DOUBLE,) * 4 if self.even else (_SINGLE, _DOUBLE) * 2
 
     @property
     def per_line(self) -> int:
-        """Numbers of a full line."""
+        """Count of numbers in a full line."""
         return len(self.widths)
 
 
@@ -101,7 +101,7 @@ def uff_contents(path: Path, options: SourceOptions) -> Contents:
     Raises
     ------
     DataError
-        It is no universal file, cut short, or a header contradicts its numbers.
+        If it is not a universal file, truncated, or a header contradicts its numbers.
     """
     del options
     size = path.stat().st_size
@@ -114,7 +114,7 @@ def uff_contents(path: Path, options: SourceOptions) -> Contents:
         handle.seek(0)
         while (kind := _next_set(path, handle)) is not None:
             if len(sets) + len(others) > _MOST_SETS:
-                raise DataError(f"{path} holds > {_MOST_SETS} sets, the most believed; split it")
+                raise DataError(f"{path} holds > {_MOST_SETS} sets, too many; split it")
             number = kind[:6].strip()
             if number == b"164":
                 scales = _unit_system(path, handle)
@@ -158,7 +158,7 @@ def _skip_to_mark(path: Path, handle: BinaryIO) -> None:
 
 
 def _unit_system(path: Path, handle: BinaryIO) -> tuple[float, float]:
-    """Metres and newtons per unit of the file, of data set 164."""
+    """Metres and newtons per unit of the file, from data set 164."""
     handle.readline(_LONGEST_LINE)
     factors = [
         float(token.replace(b"D", b"E"))
@@ -191,7 +191,7 @@ def _read_set(path: Path, handle: BinaryIO, kind: bytes, size: int) -> _Set:
 
 
 def _header(path: Path, head: list[str]) -> _Set:
-    """What the eleven lines before the numbers say."""
+    """Set described by the eleven lines before the numbers."""
     form, abscissa, ordinate = head[6], head[7], head[8]
     code, count, even = (_integer(path, form, 10 * i, 10) for i in range(3))
     if code not in (2, 4, 5, 6) or count < 1 or even not in (0, 1):
@@ -247,7 +247,7 @@ def _label(text: str) -> str:
 
 
 def _name(identification: str, description: str) -> str:
-    """Entity and degree of freedom of the response; the description where it has neither."""
+    """Node and degree of freedom of the response; the description if it has neither."""
     entity = _label(identification[31:41])
     node, direction = identification[41:51].strip(), identification[51:55].strip()
     if entity:
@@ -276,7 +276,7 @@ def _binary(path: Path, handle: BinaryIO, item: _Set, kind: bytes, size: int) ->
             "754); export it again"
         )
     wanted = item.count * item.per_sample * (8 if item.double else 4)
-    # how the time is stored beside double precision is not agreed upon
+    # storage of the time with double precision is not standardised
     if length != wanted or (item.double and not item.even):
         raise DataError(
             f"{path}: {item.name} has {length} byte for {item.count} value(s), must have {wanted}; "
@@ -286,7 +286,7 @@ def _binary(path: Path, handle: BinaryIO, item: _Set, kind: bytes, size: int) ->
 
 
 def _refuse_no_mark(path: Path, handle: BinaryIO) -> None:
-    """The mark follows binary numbers at once or on the next line; leave the handle before it."""
+    """Check the mark after the binary numbers, on the same or the next line; do not consume it."""
     place = handle.tell()
     line = handle.readline(_LONGEST_LINE)
     if not line.strip():
@@ -319,7 +319,7 @@ def _printed(path: Path, handle: BinaryIO, item: _Set) -> _Set:
 def _parts(
     path: Path, sets: Sequence[_Set], scales: tuple[float, float] | None
 ) -> tuple[FilePart, ...]:
-    """One part of all sets where they fit together; else one of each."""
+    """One part of all sets if they fit together; otherwise one for each."""
     fetches = [_fetcher(path, item) for item in sets]
     rates = [_rate(path, item) for item in sets]
     channels = [PartChannel(name=item.name, unit=_unit(item, scales)) for item in sets]
@@ -359,7 +359,7 @@ def _stacked(
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Names with their number where one occurs again."""
+    """Names, with a number added to repeated ones."""
     return [
         name if names.count(name) == 1 else f"{name}#{names[: i + 1].count(name)}"
         for i, name in enumerate(names)
@@ -367,7 +367,7 @@ def _unique(names: Sequence[str]) -> list[str]:
 
 
 def _unit(item: _Set, scales: tuple[float, float] | None) -> str | None:
-    """Unit by the label; else by the quantity and the file's unit system (data set 164)."""
+    """Unit by the label, or else by the quantity and the file's unit system (data set 164)."""
     if item.unit:
         return item.unit
     if scales is None or item.quantity not in _SI:
@@ -378,7 +378,7 @@ def _unit(item: _Set, scales: tuple[float, float] | None) -> str | None:
 
 
 def _rate(path: Path, item: _Set) -> tuple[float, float]:
-    """Sample rate and its relative doubt."""
+    """Sample rate and its relative uncertainty."""
     if item.even:
         if not (math.isfinite(item.step) and item.step > 0):
             raise DataError(
@@ -388,7 +388,7 @@ def _rate(path: Path, item: _Set) -> tuple[float, float]:
         return 1.0 / item.step, item.step_doubt
     times = partial(_values, item, _numbers(path, item), 0)
     last = float(times(item.count - 1, item.count)[0])
-    # five digits are printed behind the first
+    # five digits are printed after the first
     resolution = 10.0 ** (math.floor(math.log10(abs(last))) - 5) if last and item.lines else 0.0
     clock = even_rate(path, item.name, times, item.count, resolution)
     return 1.0 / clock.step, clock.doubt
@@ -405,7 +405,7 @@ def _values(item: _Set, numbers: _Run, which: int, start: int, stop: int) -> NDA
 
 
 def _numbers(path: Path, item: _Set) -> _Run:
-    """Numbers of a set as they are stored, abscissas among them."""
+    """Numbers of a set as stored, including abscissas."""
     if item.lines is not None:
         return partial(_from_lines, path, item, item.lines)
     flat = Flat(
@@ -420,7 +420,7 @@ def _numbers(path: Path, item: _Set) -> _Run:
 
 
 def _from_bytes(flat: Flat, start: int, stop: int) -> NDArray[np.float64]:
-    with np.errstate(invalid="ignore"):  # a NaN that signals is refused by name later
+    with np.errstate(invalid="ignore"):  # a signalling NaN is refused by name later
         return np.asarray(flat.fetch(start, stop, (0,))[0], dtype=np.float64)
 
 
@@ -436,7 +436,7 @@ def _from_lines(path: Path, item: _Set, lines: Lines, start: int, stop: int) -> 
     try:
         found = np.array(tokens, dtype="S32").astype(np.float64)
     except ValueError as error:
-        raise DataError(f"{path}: {item.name} holds {error}, must be numbers; mend it") from None
+        raise DataError(f"{path}: {item.name} holds {error}, must be numbers; correct it") from None
     if len(found) != wanted:
         raise DataError(
             f"{path}: {item.name} has {len(found)} numbers in lines {first} to {last} of it, must "

@@ -30,7 +30,7 @@ _MOST_CHUNKS = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class _Format:
-    """What the fmt chunk says."""
+    """Content of the fmt chunk."""
 
     kind: int
     n_channels: int
@@ -40,7 +40,7 @@ class _Format:
 
     @property
     def width(self) -> int:
-        """Container of one sample [byte]; 0 where frames are not whole containers."""
+        """Container of one sample [byte]; 0 if frames are not whole containers."""
         whole = self.n_channels > 0 and self.frame % self.n_channels == 0
         return self.frame // self.n_channels if whole else 0
 
@@ -48,15 +48,15 @@ class _Format:
 def wav_contents(path: Path, options: SourceOptions) -> Contents:
     """The one recording of a WAV file.
 
-    Integers are given as the file holds them, those of one byte less their midpoint, and are parts
-    of full scale. Samples of fewer bits than their container lie at its upper end. Mu-law and
-    A-law are expanded to integers of 16 bits.
+    Integers are returned as stored, those of one byte less their midpoint, as parts of full scale.
+    Samples with fewer bits than their container lie at its upper end. Mu-law and A-law are expanded
+    to integers of 16 bits.
 
     Raises
     ------
     DataError
-        It is no WAV file, cut short (unless `partial` asks for what is there), of another coding,
-        or its header contradicts itself.
+        If it is not a WAV file, truncated (unless `partial` is set), of another coding, or its
+        header contradicts itself.
 
     References
     ----------
@@ -151,7 +151,7 @@ def _signed(fetch: Fetch) -> Fetch:
 def _chunks(
     path: Path, handle: BinaryIO, order: str, size: int, partial: bool
 ) -> dict[bytes, tuple[int, int]]:
-    """Place and length of the first chunk of every name; each must lie within the file.
+    """Position and length of the first chunk of every name; each must lie within the file.
 
     With `partial` the samples need not.
     """
@@ -171,8 +171,8 @@ def _chunks(
         if place + 8 + length > size and not (samples and partial):
             raise cut(path, size, place + 8 + length, partial=samples)
         found.setdefault(name, (place + 8, length))
-        place += 8 + length + length % 2  # chunks begin at even places
-    raise DataError(f"{path} has > {_MOST_CHUNKS} chunks, the most believed; take an intact copy")
+        place += 8 + length + length % 2  # chunks begin at even positions
+    raise DataError(f"{path} has > {_MOST_CHUNKS} chunks, too many; take an intact copy")
 
 
 def _format(path: Path, place: tuple[int, int], order: str) -> _Format:
@@ -190,7 +190,7 @@ def _format(path: Path, place: tuple[int, int], order: str) -> _Format:
 
 
 def _refuse_coding(path: Path, form: _Format) -> None:
-    """Refuse what has no samples of its own, and containers that do not fit them."""
+    """Refuse codings without samples of their own, and containers that do not fit them."""
     fits = {
         _PCM: 1 <= form.bits <= 64,
         _FLOAT: form.bits in (32, 64),

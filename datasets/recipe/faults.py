@@ -1,4 +1,4 @@
-"""What is wrong with a recipe: lives, twins, confounders, one place drawn twice."""
+"""Faults of a recipe: lives, twins, confounders, one place drawn twice."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -23,12 +23,13 @@ _PLACED = re.compile(
 _UNLIMITED = re.compile(r"(?P<place>.+ = .+)(?P<fault> of \S+ needs wear limits, .+)")
 
 
-def told_once(faults: Sequence[str]) -> list[str]:
-    """Faults with those that several draws share told once, behind the places of all.
+def merged_faults(faults: Sequence[str]) -> list[str]:
+    """Faults, with one shared by several draws given once, after the places of all.
 
     Examples
     --------
-    >>> told_once(["machine.0 (a.b): a.c is missing", "machine.1 (a.d): a.c is missing", "other"])
+    >>> merged_faults(["machine.0 (a.b): a.c is missing", "machine.1 (a.d): a.c is missing",
+    "other"])
     ['machine.0 (a.b), machine.1: a.c is missing', 'other']
     """
     places: dict[str, list[str]] = {}
@@ -37,19 +38,19 @@ def told_once(faults: Sequence[str]) -> list[str]:
             places.setdefault(limits["fault"], []).append(limits["place"])
             continue
         match = _PLACED.fullmatch(text)
-        told = places.setdefault(match["fault"] if match else text, [])
+        named = places.setdefault(match["fault"] if match else text, [])
         if match:
-            told.append(match["place"] if told else match["place"] + (match["about"] or ""))
+            named.append(match["place"] if named else match["place"] + (match["about"] or ""))
     return [
-        f"{', '.join(told)}{'' if fault.startswith(' of ') else ': '}{fault}" if told else fault
-        for fault, told in places.items()
+        f"{', '.join(named)}{'' if fault.startswith(' of ') else ': '}{fault}" if named else fault
+        for fault, named in places.items()
     ]
 
 
 def faults_of_life(
     table: RecipeTable, axes: Mapping[str, list[Axis]], base: Mapping[str, Any]
 ) -> list[str]:
-    """What of a life does not fit the first severity, where that is sound itself."""
+    """Faults of a life with regard to the first severity, if that is valid itself."""
     worn = next(iter(axes.get("severity.0", ())), None)
     column = severity_column(table.severity[0].path)
     if table.life is None or not isinstance(worn, Range) or column is None:
@@ -63,7 +64,7 @@ def faults_of_life(
 def twin_faults(
     table: RecipeTable, machine: Sequence[Axis], choices: Sequence[Alternatives]
 ) -> list[str]:
-    """Numbers of a twin that the recipe does not draw."""
+    """Faults of a twin: numbers that the recipe does not draw."""
     if table.twin is None:
         return []
     lost = sorted(set(table.twin.names) - set(coordinate_names(machine, choices)))
@@ -76,7 +77,7 @@ def twin_faults(
 
 
 def machine_faults(table: RecipeTable, folder: Path) -> list[str]:
-    """Machines are another recipe's only if all that decides them is the same there."""
+    """Refuse the machines of another recipe unless all that determines them is the same there."""
     if not table.machines_of:
         return []
     file = folder / f"{table.machines_of}.toml"
@@ -99,7 +100,7 @@ def machine_faults(table: RecipeTable, folder: Path) -> list[str]:
 
 
 def faults_of(table: Mapping[str, Any]) -> list[str]:
-    """Faults of a scene as a table."""
+    """Faults of a scene given as a table."""
     try:
         scene_from_table(table)
     except SceneError as error:
@@ -108,7 +109,7 @@ def faults_of(table: Mapping[str, Any]) -> list[str]:
 
 
 def path_clashes(paths: Sequence[str]) -> list[str]:
-    """Places that are drawn more than once, or must be one for all records."""
+    """Paths that are drawn more than once, or must be the same for all records."""
     held = [path for path in paths if path in ("duration", "sample_rate")]
     return [f"{path} is drawn, must be one for all records; put it in [fixed]" for path in held] + [
         f"{path} is drawn {paths.count(path)} times, must be once; remove the others"
@@ -118,7 +119,7 @@ def path_clashes(paths: Sequence[str]) -> list[str]:
 
 
 def confounder_faults(confounders: Sequence[Confounder]) -> list[str]:
-    """Names told twice, and probabilities that do not fit together."""
+    """Repeated names, and probabilities that do not fit together."""
     names = [confounder.name for confounder in confounders]
     faults = [
         f"confounder name '{name}' is given {names.count(name)} times, must be unique; rename one"
@@ -144,7 +145,7 @@ _ROUNDING = 1e-12  # thirds and tenths add up to a little more than one
 
 
 def exclusive_sets(confounders: Sequence[Confounder]) -> dict[str, list[Confounder]]:
-    """Confounders that exclude each other, by their word; a free one is alone under its name."""
+    """Groups of mutually exclusive confounders, by their word; a free one is alone by name."""
     sets: dict[str, list[Confounder]] = {}
     for confounder in confounders:
         word = f"exclusive = '{confounder.exclusive}'" if confounder.exclusive else confounder.name

@@ -1,7 +1,7 @@
-"""Numbers that a recipe draws as they were for another scene: what can be said against them.
+"""Doubts about absolute numbers that a recipe inherits from a recipe of another scene.
 
-A factor follows the scene; a number in kilograms does not. Whether it fits cannot be proved, but
-where the scene's own value lies outside of what is drawn, it hardly does.
+A factor follows the scene; a number in kilograms does not. Whether it fits cannot be proved, but it
+is unlikely to if the scene's own value lies outside the drawn range.
 """
 
 from collections.abc import Mapping
@@ -11,19 +11,19 @@ from .recipe import Recipe
 
 
 def draw_doubts(recipe: Recipe, inherited: Mapping[str, str]) -> list[str]:
-    """Draws taken over from a recipe of another scene that hardly fit this one.
+    """Draws inherited from a recipe of another scene that are unlikely to fit this one.
 
     Parameters
     ----------
     recipe : Recipe
     inherited : mapping
-        Of :class:`wearstate.datasets.recipe.text.RecipeSource`.
+        Inherited draws, see :class:`wearstate.datasets.recipe.text.RecipeSource`.
 
     Returns
     -------
     list of str
-        One for each draw of machine or record whose numbers leave the scene's own value out, and
-        for each confounder: what the scene has for one that is absent says nothing about its size.
+        One message for each draw of machine or record whose range excludes the scene's own value,
+        and for each confounder: the scene's value for an absent fault says nothing about its size.
 
     Examples
     --------

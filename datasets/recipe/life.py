@@ -1,7 +1,7 @@
-"""Run to failure: every machine of a recipe over its life, recorded again and again.
+"""Run to failure: every machine of a recipe over its life, recorded at intervals.
 
-A recipe with a ``[life]`` table does not draw its first severity; it follows from how the machine
-wears. Manifest columns beside it are those of `LIFE_COLUMNS`.
+A recipe with a ``[life]`` table does not draw its first severity, which follows from the wear of
+the machine. Its additional manifest columns are `LIFE_COLUMNS`.
 """
 
 import math
@@ -34,31 +34,32 @@ LIFE_COLUMNS = {
     "maintenance": "<i4",
     "wear_rate_m2_per_n": "<f8",
 }
-"""Manifest columns of a life -> numpy type.
+"""Manifest columns of a life with their numpy types.
 
-``remaining_life_h`` counts operating hours until the condemning limit is next reached, maintenance
-on the way included: 0 at the limit and beyond it, NaN where the policy keeps the machine from it.
-``life_share`` is the age of the surface over the age at which it is renewed, whether planned or
-after a failure. ``maintenance`` counts what was done so far, ``wear_rate_m2_per_n`` is the
-machine's own. All of them tell the severity or what it will be: they are labels, no features.
+``remaining_life_h`` is the number of operating hours until the condemning limit is next reached,
+including maintenance on the way: 0 at the limit and beyond it, NaN if the policy prevents reaching
+it. ``life_share`` is the age of the surface over the age at which it is renewed, either planned or
+after a failure. ``maintenance`` is the number of maintenance events so far, ``wear_rate_m2_per_n``
+the machine's own wear rate. All of them reveal the severity or its future: they are labels, not
+features.
 """
 
 _HOUR = 3600.0  # s
 
 
 class TurningGear(Part):
-    """The turning gear, on which a journal bearing wears."""
+    """Turning gear, on which a journal bearing wears."""
 
-    speed: RotationSpeed = Field(gt=0, le=10, description="a few revolutions a minute")
-    share: Ratio = Field(gt=0, le=1, description="of the operating time")
-    least_film: Length = Field(gt=0, le=LONGEST, description="at which asperities begin to touch")
+    speed: RotationSpeed = Field(gt=0, le=10, description="a few revolutions per minute")
+    share: Ratio = Field(gt=0, le=1, description="share of the operating time")
+    least_film: Length = Field(gt=0, le=LONGEST, description="film at which asperities first touch")
 
 
 class MaintenanceTable(Part):
-    """Something done to the joint; give `every` or `at`."""
+    """Maintenance of the joint; give `every` or `at`."""
 
     restores: Ratio = Field(gt=0, le=1, description="share of the worn volume; 1 renews")
-    every: Time | None = Field(default=None, gt=0, description="operating time between two")
+    every: Time | None = Field(default=None, gt=0, description="operating time between two events")
     at: Length | None = Field(default=None, gt=0, description="severity at which it is due")
 
     @model_validator(mode="after")
@@ -68,39 +69,39 @@ class MaintenanceTable(Part):
 
     @property
     def rule(self) -> Maintenance:
-        """For the history."""
+        """The rule for the life history."""
         return Maintenance(restores=self.restores, every=self.every, at=self.at)
 
 
 class LifeTable(Part):
-    """How the machines of a recipe age.
+    """Ageing of the machines of a recipe.
 
-    The surface is new at the low bound of the first severity or up to `as_new_most`, and fails at
-    the high bound, where it is renewed.
+    A new surface has the low bound of the first severity, or up to `as_new_most`; it fails at the
+    high bound, where it is renewed.
     """
 
-    spacing: Time = Field(gt=0, description="operating time from one recording to the next")
+    spacing: Time = Field(gt=0, description="operating time between recordings")
     jitter: Ratio = Field(
-        default=0.5, ge=0, le=1, description="of the spacing: where in it a recording falls"
+        default=0.5, ge=0, le=1, description="random position of a recording, share of the spacing"
     )
     wear_rate: float = Field(
         ge=0, le=WEAR_RATE_MOST, description="m^2/N, median of the machines; 1 mm^3/(N m) is 1e-9"
     )
     spread: Ratio = Field(
-        default=0.0, ge=0, le=3, description="of its logarithm between machines, normal"
+        default=0.0, ge=0, le=3, description="normal deviation of its logarithm between machines"
     )
     as_new_most: Length | None = Field(
-        default=None, gt=0, description="widest new joint; none: all at the low bound"
+        default=None, gt=0, description="largest new clearance; by default the low bound"
     )
     running_in: Ratio = Field(
-        default=0.0, ge=0, le=100, description="of a new surface, over the steady rate"
+        default=0.0, ge=0, le=100, description="extra rate of a new surface, over the steady rate"
     )
-    running_in_time: Time = Field(default=_HOUR, gt=0, description="in which that falls to 1/e")
-    knots: int = Field(default=6, ge=2, le=64, description="severities at which the rate is found")
+    running_in_time: Time = Field(default=_HOUR, gt=0, description="time in which it falls to 1/e")
+    knots: int = Field(default=6, ge=2, le=64, description="severities used to compute the rate")
     width: Length | None = Field(
-        default=None, gt=0, le=LONGEST, description="of a joint along its pin, of a guide across"
+        default=None, gt=0, le=LONGEST, description="length of a pin joint, or width of a guide"
     )
-    turning: TurningGear | None = Field(default=None, description="of a journal bearing")
+    turning: TurningGear | None = Field(default=None, description="for a journal bearing")
     maintenance: tuple[MaintenanceTable, ...] = Field(
         default=(), max_length=16, description="what is renewed, and when"
     )
@@ -121,15 +122,15 @@ class Lives:
     ----------
     table : LifeTable
     base : mapping
-        Table of the scene that wears; all machines wear as it does but for their wear rate.
+        Table of the scene that wears; all machines wear alike except for their wear rate.
     path : str
-        Of the severity.
+        Path of the severity.
     low, high : float
-        As new and at failure [m].
+        Severity as new and at failure [m].
     limit : float
-        That condemns [m].
+        Condemning limit [m].
     recordings : int
-        Of every machine.
+        Number of recordings per machine.
     """
 
     table: LifeTable
@@ -142,12 +143,12 @@ class Lives:
 
     @cached_property
     def law(self) -> WearLaw:
-        """How the joint wears, from simulations at a few severities.
+        """Wear law of the joint, from simulations at a few severities.
 
         Raises
         ------
         RecipeError
-            One of them failed, or nothing slides.
+            If one of them failed, or nothing slides.
         """
         try:
             return _LAWS[self.path](self)
@@ -159,7 +160,7 @@ class Lives:
         return scene_from_table(override(self.base, {self.path: severity}))
 
     def history(self, rng: np.random.Generator) -> LifeHistory:
-        """Life of the machine that a random stream stands for."""
+        """Life of the machine with a given random stream."""
         table = self.table
         rate = table.wear_rate * math.exp(table.spread * rng.standard_normal())
         return life_history(
@@ -186,9 +187,9 @@ class Lives:
         Parameters
         ----------
         machine, record : numpy.random.Generator
-            Random streams of machine and recording, fresh.
+            Random streams of machine and recording, freshly seeded.
         place : int
-            Of the recording in the machine's life, counted from 0.
+            Number of the recording in the machine's life, counted from 0.
 
         Returns
         -------
@@ -210,17 +211,17 @@ class Lives:
 def life_faults(
     table: LifeTable, path: str, low: float, high: float, limit: float | None
 ) -> list[str]:
-    """What of a life does not fit the rest of its recipe.
+    """Faults of a life with regard to the rest of its recipe.
 
     Parameters
     ----------
     table : LifeTable
     path : str
-        Of the first severity.
+        Path of the first severity.
     low, high : float
         Its bounds [m].
     limit : float or None
-        That condemns [m]; None where the scene has none.
+        Condemning limit [m]; None if the scene has none.
 
     Returns
     -------
@@ -255,16 +256,16 @@ def life_faults(
     return faults
 
 
-# --- how each severity wears
+# --- wear laws of the severities
 
 
 def _knots(lives: Lives) -> list[float]:
-    """Closer where the joint is new: there a film's load share changes most."""
+    """Severities for the law, denser for a new joint: its film's load share varies most there."""
     return [float(knot) for knot in np.geomspace(lives.low, lives.high, lives.table.knots)]
 
 
 def _pin_law(joint: str, lives: Lives) -> WearLaw:
-    """The eye's scar keeps its mean shape, so that the play grows with the volume."""
+    """Pin joint: the eye's scar keeps its mean shape; the clearance grows with the volume."""
     scenes = [cast(PumpScene, lives.scene(knot)) for knot in _knots(lives)]
     found = [_joint_wear(scene, joint) for scene in scenes]
     shape = np.mean([wear.eye for wear in found], axis=0)
@@ -274,7 +275,7 @@ def _pin_law(joint: str, lives: Lives) -> WearLaw:
 
 
 def _guide_law(lives: Lives) -> WearLaw:
-    """Either face is lowered evenly; what both lose is the play."""
+    """Guide: each face wears evenly; the clearance is the sum of both."""
     scenes = [cast(PumpScene, lives.scene(knot)) for knot in _knots(lives)]
     guide = scenes[0].joint.guide
     assert guide is not None  # the severity is its clearance
@@ -283,7 +284,7 @@ def _guide_law(lives: Lives) -> WearLaw:
 
 
 def _joint_wear(scene: PumpScene, joint: str) -> "JointWear":
-    from ...sim.wear.rate import joint_wear  # kernels, which to read a recipe needs none of
+    from ...sim.wear.rate import joint_wear  # compiled kernels, not needed to read a recipe
 
     return joint_wear(scene, joint)
 
@@ -294,7 +295,7 @@ def _width(lives: Lives) -> float:
 
 
 def _linear_law(lives: Lives, powers: Sequence[float], gain: float) -> WearLaw:
-    """Severity that grows by so much per volume [1/m^2]."""
+    """Severity that grows in proportion to the worn volume [gain: 1/m^2]."""
     return WearLaw(
         volume=np.array([(knot - lives.low) / gain for knot in _knots(lives)]),
         power=np.array(powers),
@@ -304,8 +305,8 @@ def _linear_law(lives: Lives, powers: Sequence[float], gain: float) -> WearLaw:
 
 
 def _scar_law(lives: Lives) -> WearLaw:
-    """A scar in the shape of the shaft's own circle, worn on the turning gear."""
-    from ...sim.wear.rate import turning_wear  # kernels, which to read a recipe needs none of
+    """Scar in the shape of the shaft's circle, worn on the turning gear."""
+    from ...sim.wear.rate import turning_wear  # compiled kernels, not needed to read a recipe
 
     turning = lives.table.turning
     assert turning is not None  # checked before
@@ -337,4 +338,4 @@ _LAWS: dict[str, Callable[[Lives], WearLaw]] = {
     "joint.guide.diametral_clearance": _guide_law,
     _SCAR: _scar_law,
 }
-"""Severities whose wear is modelled. A new one is one row."""
+"""Wear laws by severity. A new one is one row."""

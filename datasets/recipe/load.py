@@ -1,4 +1,4 @@
-"""From a recipe's text to the recipe: its scene, what is fixed, every fault at once."""
+"""From a recipe's text to the recipe: its scene, fixed values, all faults at once."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -29,8 +29,8 @@ from .faults import (
     faults_of,
     faults_of_life,
     machine_faults,
+    merged_faults,
     path_clashes,
-    told_once,
     twin_faults,
 )
 from .recipe import Recipe, RecipeFault, conditions_of
@@ -60,27 +60,26 @@ def load_recipe(
     name_or_path : str or Path
         A name of `recipe_names`, or a file.
     overrides : mapping, optional
-        Dotted path of the scene -> value; set in every record like the recipe's ``[fixed]``.
+        Values by dotted path of the scene; set in every record like the recipe's ``[fixed]``.
     view : str
-        Which of its ``[views]``, further tests of the same machine states; what the view sets is
-        set like an override, and an override of the same path wins.
+        Name of one of its ``[views]``, further tests of the same machine states; its values are set
+        like overrides, and an override of the same path takes precedence.
     scene : str or Path, optional
-        Built-in scene or file in place of the one that the recipe names.
+        Built-in scene or file in place of that named in the recipe.
     twin : str or Path, optional
-        Calibrated scene, of ``wearstate calibrate``: a share of the machines is drawn from what
-        is known of it, beside those that the recipe draws.
+        Calibrated scene, made by ``wearstate calibrate``: a share of the machines is drawn from its
+        distribution, in addition to those of the recipe.
 
     Returns
     -------
     Recipe
-        Validated, with every bound in SI.
+        Validated recipe, with every bound in SI.
 
     Raises
     ------
     RecipeError
-        Every fault at once: of the tables, of paths the scene does not have, of bounds the scene
-        refuses, of correlations and held-out regions, of a recipe with other machines, of a view
-        that it does not have.
+        All faults at once: of the tables, of paths that the scene lacks, of bounds it refuses, of
+        correlations and held-out regions, of a recipe with other machines, of an unknown view.
 
     Examples
     --------
@@ -111,7 +110,7 @@ def load_recipe(
 
 
 def _view_values(table: RecipeTable, view: str) -> Mapping[str, Any]:
-    """What a view sets, by dotted path; nothing of the test that needs no name."""
+    """Values set by a view, by dotted path; none for the test without a name."""
     if view and view not in table.views:
         known = ", ".join(table.views) or "(it has none)"
         fault = f"view = {view!r} must be one of {known}; choose one, or add a table [views.{view}]"
@@ -126,11 +125,11 @@ def _resolved(
     texts: Mapping[str, str],
     faults: list[str],
 ) -> Recipe:
-    """A recipe against the table of its scene; raises every fault, those found before as well."""
+    """A recipe resolved against the table of its scene; raises all faults, earlier ones too."""
     n_before = len(faults)
     base = _with_fixed(scene, {**table.fixed, **overrides}, faults)
     if len(faults) > n_before:
-        raise RecipeError(table.name, told_once(faults))
+        raise RecipeError(table.name, merged_faults(faults))
     in_metres = with_wear_limits(table, scene_from_table(base), faults)
     places = _places(in_metres)
     unbounded = [place for place in places if any(f.startswith(f"{place}.") for f in faults)]
@@ -149,7 +148,7 @@ def _resolved(
     drawn = [axis for found in axes.values() for axis in found]
     faults += motor_faults(motors_to_take(base, drawn, choices))
     if faults:
-        raise RecipeError(table.name, told_once(faults))
+        raise RecipeError(table.name, merged_faults(faults))
     return Recipe(
         table=table,
         **texts,
@@ -166,7 +165,7 @@ def _resolved(
 
 
 def _with_lists(base: Mapping[str, Any]) -> dict[str, Any]:
-    """Table of a scene with the lists that it leaves out, empty: a ``*`` there draws nothing."""
+    """Table of a scene with its missing lists added, empty: a ``*`` there draws nothing."""
     fields = MACHINES[base["machine"]].model_fields
     return {**{name: [] for name, field in fields.items() if field.default == ()}, **base}
 
@@ -200,7 +199,7 @@ def _held_out(
 def _with_fixed(
     base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str]
 ) -> dict[str, Any]:
-    """Scene table with values replaced; limits that are changed lose their source."""
+    """Scene table with values replaced; changed limits lose their source."""
     return _with_own_sources(base, _replaced(base, fixed, faults))
 
 
@@ -208,7 +207,7 @@ _NO_SOURCE = "given by the recipe in place of those of the scene"
 
 
 def _with_own_sources(before: Mapping[str, Any], after: dict[str, Any]) -> dict[str, Any]:
-    """Limits that are no longer those of their source must not cite it."""
+    """Remove the source of limits that were changed."""
     own = {
         name: {**after[name], "source": _NO_SOURCE}
         for name in sorted({each.limits for each in all_wear_places().values()})
@@ -221,12 +220,12 @@ def _with_own_sources(before: Mapping[str, Any], after: dict[str, Any]) -> dict[
 
 def _replaced(base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     together = base
-    with suppress(SceneError):  # values may need each other: a rung and what it asks for
+    with suppress(SceneError):  # values may depend on each other: a rung and its needs
         for pattern, value in fixed.items():
             together = override(together, dict.fromkeys(matches(together, pattern), value))
         scene_from_table(together)
         return together
-    own = faults_of(base)  # told as such where no value mends them
+    own = faults_of(base)  # reported as such unless the values correct them
     for pattern, value in fixed.items():
         try:
             base = override(base, dict.fromkeys(matches(base, pattern), value))
@@ -240,7 +239,7 @@ def _replaced(base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str])
 
 
 def _places(table: RecipeTable) -> dict[str, Draw]:
-    """Every draw of a recipe by its place in the file, for messages."""
+    """All draws of a recipe by their place in the file, for messages."""
     worn = [
         Draw(path=severity.path, distribution="log-uniform", low=severity.low, high=severity.high)
         for severity in table.severity
@@ -262,7 +261,7 @@ def _of(axes: Mapping[str, list[Axis]], name: str) -> list[Axis]:
 def _fault_sets(
     confounders: Sequence[Confounder], axes: Mapping[str, list[Axis]]
 ) -> dict[str, tuple[RecipeFault, ...]]:
-    """Confounders with their axes, those that exclude each other together."""
+    """Confounders with their axes, mutually exclusive ones together."""
     faults = {
         confounder.name: RecipeFault(
             table=confounder,
@@ -277,12 +276,12 @@ def _fault_sets(
 
 
 def recorded_scene(scene: str, recipe: str, overrides: str) -> Scene:
-    """Scene of a data set before anything was drawn, from the texts in its file.
+    """Scene of a data set before any draws, from the texts in its file.
 
     Parameters
     ----------
     scene, recipe, overrides : str
-        As `Attributes` has them; recipe and overrides may be empty.
+        As in `Attributes`; recipe and overrides may be empty.
 
     Returns
     -------
@@ -291,7 +290,7 @@ def recorded_scene(scene: str, recipe: str, overrides: str) -> Scene:
     Raises
     ------
     SceneError
-        The texts are no scene, as those of a measured data set.
+        If the texts are not a scene, as in a measured data set.
 
     Examples
     --------
@@ -314,7 +313,7 @@ def recorded_recipe(scene: str, recipe: str, overrides: str) -> Recipe:
     Parameters
     ----------
     scene, recipe, overrides : str
-        As `Attributes` has them.
+        As in `Attributes`.
 
     Returns
     -------
@@ -323,7 +322,7 @@ def recorded_recipe(scene: str, recipe: str, overrides: str) -> Recipe:
     Raises
     ------
     RecipeError
-        The texts are no recipe and its scene, as those of a measured data set.
+        If the texts are not a recipe and its scene, as in a measured data set.
 
     Examples
     --------

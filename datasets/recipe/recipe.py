@@ -1,4 +1,4 @@
-"""A recipe, validated: what records are drawn from, and the seeds of their random streams."""
+"""A validated recipe: distribution of the records, and the seeds of their random streams."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from .life import LIFE_COLUMNS, Lives
 from .table import Confounder, RecipeTable
 
 IS_TWIN = "twin"
-"""Manifest column that says whether a record is of the calibrated machine."""
+"""Manifest column: whether a record is of the calibrated machine."""
 
 VIEW = "view"
-"""Manifest column that names which test of its machine state a record is."""
+"""Manifest column: test of its machine state that a record belongs to."""
 
-# independent random streams of one data set; their numbers decide the records of every recipe
+# independent random streams of one data set; their numbers determine the records of every recipe
 (
     MACHINE_STREAM,
     RECORD_STREAM,
@@ -52,9 +52,9 @@ class Wearing:
         Manifest column of the value.
     grade_column : str
         Manifest column of its grade: ``grade`` for the first severity; empty for a further one
-        that the scene has no wear limits for.
+        without wear limits in the scene.
     edges : tuple of float
-        Where grades 1, 2 and 3 begin [m]; empty without wear limits.
+        Severities at which grades 1, 2 and 3 begin [m]; empty without wear limits.
     """
 
     axis: Range
@@ -70,9 +70,9 @@ class RecipeFault:
     Attributes
     ----------
     table : Confounder
-        What the recipe says.
+        Table in the recipe.
     axes : tuple of Range
-        One for every value that its path stands for; all take the same random number.
+        One axis for every value that its path matches; all take the same random number.
     """
 
     table: Confounder
@@ -91,27 +91,27 @@ class Recipe:
     Attributes
     ----------
     table : RecipeTable
-        What the file says, with what it extends.
+        Tables of the file, including those it extends.
     text, scene_text : str
-        TOML of recipe and scene; that of a recipe which extends another holds both.
+        TOML of recipe and scene; for a recipe that extends another, both in one.
     overrides : mapping
-        What replaced values of the recipe file, by dotted path.
+        Values that replace those of the recipe file, by dotted path.
     base : dict
-        Scene table with the fixed values in place.
+        Scene table with the fixed values set.
     severities : tuple of Wearing
-        The first is graded and trained for.
+        Severities; the first is graded and used for training.
     machine, record : tuple of Range or Vector
-        Nuisance and conditions, in the order in which they are drawn.
+        Nuisance parameters and conditions, in the order in which they are drawn.
     choices : tuple of Alternatives
         Discrete draws.
     confounders : mapping
-        Name of a random stream -> confounders that share it because they exclude each other.
+        Confounders by the random stream that they share because they exclude each other.
     copulas : mapping
-        Level, ``severity``, ``machine`` or ``record`` -> correlation of its draws.
+        Correlation of the draws of each level: ``severity``, ``machine`` or ``record``.
     held_out : tuple of HeldOut
-        Regions to test on.
+        Regions for testing.
     view : str
-        Which of the recipe's tests of each machine state; empty of the one that needs no name.
+        Test of each machine state; empty for the one without a name.
     """
 
     table: RecipeTable
@@ -140,7 +140,7 @@ class Recipe:
 
     @property
     def severity(self) -> Range:
-        """What is graded and trained for."""
+        """The severity that is graded and used for training."""
         return self.severities[0].axis
 
     @property
@@ -150,17 +150,17 @@ class Recipe:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene before anything is drawn."""
+        """The scene before any draws."""
         return scene_from_table(self.base)
 
     @cached_property
     def conditions(self) -> dict[str, str]:
-        """Operating conditions that this scene has: manifest column -> dotted path."""
+        """Dotted path of each operating condition of this scene, by manifest column."""
         return conditions_of(self.scene)
 
     @cached_property
     def columns(self) -> dict[str, str]:
-        """Manifest columns of labels and conditions -> numpy type, in order."""
+        """Manifest columns of labels and conditions with their numpy types, in order."""
         further = [wearing.grade_column for wearing in self.severities[1:] if wearing.grade_column]
         presence = [fault.columns[0] for fault in self.faults]
         values = [fault.columns[1] for fault in self.faults]
@@ -178,7 +178,7 @@ class Recipe:
 
     @cached_property
     def lives(self) -> Lives | None:
-        """Lives of the machines; None where severities are drawn."""
+        """Lives of the machines; None if severities are drawn."""
         if self.table.life is None:
             return None
         low, high = self.severity.bands[0]
@@ -199,7 +199,7 @@ class Recipe:
 
     @cached_property
     def takes_motors_along(self) -> bool:
-        """Whether a drawn speed takes motors on the mains along."""
+        """Whether mains-fed motors follow a drawn speed."""
         return bool(motors_to_take(self.base, (*self.machine, *self.record), self.choices))
 
     @property
@@ -208,7 +208,7 @@ class Recipe:
         return tuple(fault for members in self.confounders.values() for fault in members)
 
     def rng(self, seed: int, stream: int, *key: int) -> np.random.Generator:
-        """Random stream of one group or record, its own whatever else is drawn."""
+        """Random stream of one group or record, independent of all other draws."""
         return np.random.default_rng(self._sequence(seed, stream, *key))
 
     def _sequence(self, seed: int, stream: int, *key: int) -> np.random.SeedSequence:
@@ -218,7 +218,7 @@ class Recipe:
         return np.random.SeedSequence([seed, number_of(name)], spawn_key=(stream, *key))
 
     def noise_seed(self, seed: int, index: int) -> int:
-        """Seed of the sensor noise of one record, another in each view."""
+        """Seed of the sensor noise of one record, different in each view."""
         view = (number_of(self.view),) if self.view else ()
         state = self._sequence(seed, NOISE_STREAM, index, *view).generate_state(1, np.uint64)
         return int(state[0])
@@ -239,7 +239,7 @@ def condition_of(scene: Scene, column: str) -> float:
 
 
 def conditions_of(scene: Scene) -> dict[str, str]:
-    """Operating conditions that a scene has: manifest column -> dotted path."""
+    """Dotted path of each operating condition of a scene, by manifest column."""
     return {
         each.column: each.path for each in scene.condition_places if has_value(scene, each.path)
     }

@@ -1,8 +1,8 @@
-"""Records of a recipe, lazily: what is drawn for each, from its own random streams.
+"""Records of a recipe, one at a time: values drawn for each from its own random streams.
 
-Record `i` depends on the recipe's name, the seed and `i` alone: not on how many records there
-are, in which order or where they are made. Nor does a draw depend on which severities and
-confounders stand beside it: each is randomised by its own name.
+Record `i` depends on the recipe's name, the seed and `i` alone: not on the number of records or on
+where and in which order they are made. Nor does a draw depend on the other severities and
+confounders: each is randomised by its own name.
 """
 
 import json
@@ -40,14 +40,14 @@ from .recipe import (
 from .text import RecipeError
 
 STRATA = BLOCK
-"""Severities of each run of this many records fall in as many equal parts of the range."""
+"""In each run of this many records, the severities fill as many equal parts of their range."""
 
 LARGEST_SEED = 2**63 - 1
-"""Seed of a data set: fits a signed integer in every file format."""
+"""Largest seed of a data set: fits a signed integer in every file format."""
 
 _SEVERITIES_OF_SET = 1
-"""Dimensions of a Sobol sequence kept for severities: the first one is even together with the first
-two draws of its record, speed and load; one more of either moves none of the other."""
+"""Dimensions of a Sobol sequence reserved for severities: the first one is even together with the
+first two draws of its record, speed and load; one more of either does not change the others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +59,13 @@ class Sample:
     index, group : int
         Record and machine number.
     seed : int
-        Of the sensor noise, 64 bit.
+        Seed of the sensor noise, 64 bit.
     row : dict
         Manifest values known before the simulation.
     drawn : dict
-        Dotted path of the scene -> value drawn [SI]; of confounders, those present.
+        Drawn values [SI] by dotted path of the scene; for confounders, those present.
     scene : Scene
-        Validated.
+        Validated scene.
     """
 
     index: int
@@ -86,37 +86,38 @@ def sample_records(
     recipe : Recipe
         See `load_recipe`.
     n : int, optional
-        How many; the recipe's own number unless given.
+        Number of records; by default the recipe's own.
     seed : int
-        Of the data set, >= 0. A larger `n` with the same seed begins with the same records.
+        Seed of the data set, >= 0. A larger `n` with the same seed begins with the same records.
     skip : numpy.ndarray [shape=(n,)], optional
         Records to leave out.
 
     Yields
     ------
     Sample
-        In rising order of record number.
+        Samples in rising order of record number.
 
     Raises
     ------
     RecipeError
-        `n` or `seed` is out of bounds.
+        If `n` or `seed` is out of bounds.
     SceneError
-        A drawn combination is no valid scene.
+        If a drawn combination is not a valid scene.
 
     Notes
     -----
-    The recipe's ``sampling`` says how even the draws are, see :class:`~.recipe.sampling.Points`:
-    those of machines over the machines, those of records, severities among them, over the records.
-    Machine and record are paired at random. Severities are log-uniform; whatever the sampling,
-    every block of `STRATA` records holds one value of each severity in each of that many equal
-    parts of its (logarithmic) range, in shuffled order, so that small sets are balanced.
+    The recipe's ``sampling`` determines how even the draws are, see
+    :class:`~.recipe.sampling.Points`: those of machines over the machines, those of records,
+    including severities, over the records. Machine and record are paired at random. Severities are
+    log-uniform; with any sampling, every block of `STRATA` records holds one value of each severity
+    in each of that many equal parts of its (logarithmic) range, in shuffled order, so that small
+    sets are balanced.
 
     With a ``life`` the first severity is not drawn: a group is one machine over its life, its
     records in the order of time, see :class:`~.recipe.life.Lives`.
 
-    Confounders come and go with their probabilities, independently of each other but for those
-    that exclude each other. Where one is absent, the scene's own value stays.
+    Confounders occur with their probabilities, independently of each other except those that
+    exclude each other. If one is absent, the scene keeps its own value.
 
     Examples
     --------
@@ -136,14 +137,14 @@ def sample_records(
 
 @dataclass(frozen=True)
 class _Source:
-    """Where the draws of one level come from."""
+    """Source of the draws of one level."""
 
     axes: Sequence[Axis]
     points: Points
     copula: Copula | None
 
     def coordinates(self, number: int) -> dict[str, float]:
-        """Numbers in (0, 1) that one machine or record is drawn by."""
+        """Coordinates in (0, 1) of one machine or record."""
         point = self.points.at(number)
         names = [entry for axis in self.axes for entry in axis.entries]
         return dict(
@@ -151,14 +152,14 @@ class _Source:
         )
 
     def values(self, number: int, known: Mapping[str, float] | None = None) -> dict[str, Any]:
-        """Values of one machine or record by path, at coordinates that are known or drawn."""
+        """Values of one machine or record by path, at known or drawn coordinates."""
         at = {**self.coordinates(number), **(known or {})}
         return {axis.path: axis.value([at[entry] for entry in axis.entries]) for axis in self.axes}
 
 
 def _sources(recipe: Recipe, seed: int) -> dict[str, _Source]:
     method = recipe.table.sampling
-    # free draws of a severity would leave a small set without a grade
+    # independent draws of a severity would leave a small set without some grades
     balanced: Sampling = "latin-hypercube" if method == "random" else method
     machine, record = (
         partial(recipe.rng, seed, stream) for stream in (MACHINE_STREAM, RECORD_STREAM)
@@ -180,7 +181,7 @@ def _sources(recipe: Recipe, seed: int) -> dict[str, _Source]:
 
 
 def _dimensions(axes: Sequence[Axis], places: range) -> list[CubeAxis]:
-    """Dimensions of some draws, in these places of one Sobol sequence after the other."""
+    """Dimensions of some draws, at these places in one Sobol sequence after the other."""
     names = [entry for axis in axes for entry in axis.entries]
     return [
         CubeAxis(name=name, slot=SET * (k // len(places)) + places[k % len(places)])
@@ -220,7 +221,7 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
 
 
 def _known(recipe: Recipe, group: int, seed: int) -> dict[str, float]:
-    """Coordinates of a machine that is the twin; none of one that the recipe draws."""
+    """Coordinates of a machine that is the twin; none for one drawn by the recipe."""
     if recipe.twin is None:
         return {}
     rng = recipe.rng(seed, TWIN_STREAM, group)
@@ -243,7 +244,7 @@ def _choices(
 
 
 def _moment(recipe: Recipe, group: int, index: int, seed: int) -> Moment | None:
-    """Where in the life of its machine a record is; None where severities are drawn."""
+    """Moment in the life of its machine for a record; None if severities are drawn."""
     if recipe.lives is None:
         return None
     place = index - group * recipe.table.records_per_group
@@ -260,7 +261,7 @@ def _confounded(recipe: Recipe, group: int, index: int, seed: int) -> dict[str, 
         for member in members:
             if 0 <= left < member.table.probability:
                 key = (CONFOUNDER_STREAM, number_of(member.table.name), which)
-                # the same number at every place that the path stands for
+                # the same number for every match of the path
                 place = recipe.rng(seed, *key).random()
                 found[member.table.name] = {axis.path: axis.value([place]) for axis in member.axes}
             left -= member.table.probability

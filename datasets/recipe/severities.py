@@ -1,4 +1,4 @@
-"""Severities of a recipe and their wear limits: columns, places, clearances."""
+"""Severities of a recipe and their wear limits: columns, paths, clearances."""
 
 import re
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from .table import RecipeTable, Severity
 
 
 def with_wear_limits(table: RecipeTable, scene: Scene, faults: list[str]) -> RecipeTable:
-    """Bounds of wear that are told by limits in metres, by those of the scene."""
+    """The table with bounds of wear relative to limits converted to metres."""
 
     def metres(bound: Bound | None, column: str | None, place: str) -> Bound | None:
         if bound is None or column is None:
@@ -23,7 +23,7 @@ def with_wear_limits(table: RecipeTable, scene: Scene, faults: list[str]) -> Rec
             return bound_of_limits(bound, wear_limits(scene, column))
         except ValueError as error:
             faults.append(f"{place} = {bound!r} of {column} {error}")
-            return 1.0  # a length, so that what else is wrong is found
+            return 1.0  # a valid length, so that further faults are found
 
     ends = ("low", "high")
     worn = tuple(
@@ -57,7 +57,7 @@ def with_wear_limits(table: RecipeTable, scene: Scene, faults: list[str]) -> Rec
 
 
 def limit_faults(recipe: Recipe) -> list[str]:
-    """What keeps the records of a recipe from being graded.
+    """Reasons why the records of a recipe cannot be graded.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def limit_faults(recipe: Recipe) -> list[str]:
     Returns
     -------
     list of str
-        Empty where the first severity has limits.
+        Faults; empty if the first severity has limits.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def limit_faults(recipe: Recipe) -> list[str]:
 
 
 def severity_faults(severities: Sequence[Severity]) -> list[str]:
-    """Places that are no known severity."""
+    """Paths that are no known severity."""
     known = ", ".join(all_wear_places())
     return [
         f"severity.{i}.path = {severity.path!r} is no known severity; choose one of {known}, "
@@ -114,14 +114,14 @@ _ENTRY = r"(?<=\.)[0-9]+(?=\.)"
 
 
 def pattern_of(path: str) -> str:
-    """A dotted path with every entry of a list starred."""
+    """A dotted path with every list index replaced by a star."""
     return re.sub(_ENTRY, "*", path)
 
 
 def wearing_of(
     severities: Sequence[Severity], axes: Sequence[Axis], scene: Scene
 ) -> tuple[Wearing, ...]:
-    """Severities with their axes, columns and the edges of their grades."""
+    """Severities with their axes, columns and grade edges."""
     result: list[Wearing] = []
     for severity, axis in zip(severities, axes, strict=True):
         column = severity_column(severity.path)
@@ -142,15 +142,15 @@ def wearing_of(
 
 
 def clearances(scene: Scene) -> dict[str, float]:
-    """Every severity of a scene that acts, by its manifest column [m].
+    """All severities of a scene that have an effect, by manifest column [m].
 
-    None of an ideal joint; those of one throw only where they are not those of all; of the bearings
-    of a shaft the first, and those with a fault.
+    Ideal joints have none; those of a single throw are included only if they differ from those of
+    all; for the bearings of a shaft, the first one and those with a fault.
 
     Parameters
     ----------
     scene : Scene
-        Of any machine.
+        Scene of any machine.
 
     Examples
     --------
@@ -179,9 +179,9 @@ def clearances(scene: Scene) -> dict[str, float]:
 def silent_faults(
     severities: Sequence[Severity], scene: Scene, choices: Sequence[Alternatives]
 ) -> list[str]:
-    """Clearances that a recipe draws of a joint that is ideal, always or with some option.
+    """Clearances drawn for a joint that is ideal, always or with some option.
 
-    Such a joint has none: records would be labelled with a wear that nothing in them shows.
+    An ideal joint has no clearance: records would have a wear label without any effect.
     """
     faults = []
     for i, severity in enumerate(severities):
@@ -198,7 +198,7 @@ def silent_faults(
 
 
 def _rungs(joint: str, scene: Scene, choices: Sequence[Alternatives]) -> list[tuple[str, str]]:
-    """Where a recipe decides the rung of a joint, and as what."""
+    """The cases in which a recipe determines the rung of a joint, and the rung."""
     path, own = f"{joint}.rung", _rung_of(scene, joint)
     found = [
         (f"with option {option.name!r} of choice {choice.name!r}", option.values.get(path, own))
@@ -210,17 +210,17 @@ def _rungs(joint: str, scene: Scene, choices: Sequence[Alternatives]) -> list[tu
 
 
 def _rung_of(scene: Scene, path: str) -> str:
-    """Rung of the part at a path; empty of one that has none, or of a plain number."""
+    """Rung of the part at a path; empty for one without rungs, or for a plain number."""
     return str(getattr(value_at(scene, path), "rung", ""))
 
 
 def wear_limits(scene: Scene, column: str) -> Wear | ScarLimits | None:
-    """Wear limits that a scene has for a severity, None where it has none.
+    """Wear limits that a scene has for a severity, None if it has none.
 
     Parameters
     ----------
     scene : Scene
-        Of any machine.
+        Scene of any machine.
     column : str
         Manifest column of the severity, see :class:`wearstate.sim.scene.scene.WearPlace`.
 

@@ -1,4 +1,4 @@
-"""The text of a recipe: built-in or a file, with what it takes over from another recipe."""
+"""The text of a recipe: built-in or a file, with all that it takes from another recipe."""
 
 import json
 import tomllib
@@ -14,9 +14,9 @@ from ..draws.wear_bounds import foreign_bounds
 RECIPE_FOLDER = Path(__file__).parent / "built_in"
 
 LONGEST_CHAIN = 8
-"""Recipes in one chain of ``extends``: more, and no reader knows what is drawn."""
+"""Longest chain of ``extends``; a longer one would be unreadable."""
 
-_OWN = ("name", "description", "extends", "without")  # what each recipe says of itself
+_OWN = ("name", "description", "extends", "without")  # keys that are never inherited
 _LISTS = {
     "severity": "path",
     "machine": "path",
@@ -25,32 +25,32 @@ _LISTS = {
     "confounder": "name",
     "held_out": "name",
 }
-"""List of a recipe -> the key that tells its entries apart."""
+"""Identifying key of the entries of each list of a recipe."""
 
 
 class RecipeError(SceneError):
-    """Every fault of one recipe, one line each."""
+    """All faults of one recipe, one line each."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecipeSource:
-    """A recipe as written, every ``extends`` followed.
+    """A recipe as written, with every ``extends`` followed.
 
     Attributes
     ----------
     table : dict
         Plain tables, not yet validated.
     text : str
-        TOML: the file's own, or, where it extends another, all of it in one.
+        TOML: the file's own, or, if it extends another, all of it in one.
     folder : Path
-        Where the scene that it names is looked for first.
+        Folder searched first for its scene.
     machines_folder : Path
-        Where the recipe that ``machines_of`` names is looked for first.
+        Folder searched first for the recipe named by ``machines_of``.
     foreign : tuple of str
-        Faults: bounds of wear that a recipe of another scene was extended with.
+        Faults: bounds of wear inherited from a recipe of another scene.
     inherited : mapping
-        Path of a draw, or name of a confounder, that a recipe of another scene was extended with
-        -> that scene.
+        Scene of origin of each draw (by path) and confounder (by name) inherited from a recipe of
+        another scene.
     """
 
     table: dict[str, Any]
@@ -73,16 +73,16 @@ def recipe_names() -> list[str]:
 
 
 def recipe_text(name_or_path: str | Path) -> str:
-    """TOML text of a built-in recipe or of a file, as it is written there.
+    """TOML text of a built-in recipe or of a file, as written.
 
     Raises
     ------
     RecipeError
-        There is neither; the nearest built-in one is named.
+        If there is neither; the nearest built-in one is named.
     """
     try:
         return _location(name_or_path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a NUL in the name
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
         fault = unread_text(name_or_path, "recipe", recipe_names(), error)
         raise RecipeError(str(name_or_path), [fault]) from None
 
@@ -100,18 +100,18 @@ def read_recipe(name_or_path: str | Path, *, twin: str | Path | None = None) -> 
     name_or_path : str or Path
         A name of `recipe_names`, or a file.
     twin : str or Path, optional
-        Calibrated scene in place of the one that the recipe names as its twin.
+        Calibrated scene in place of the twin named in the recipe.
 
     Returns
     -------
     RecipeSource
-        See `merged` for how the tables meet.
+        See `merged` for how the tables are combined.
 
     Raises
     ------
     RecipeError
-        A recipe of the chain is missing or no TOML, the chain is a circle or longer than
-        `LONGEST_CHAIN`, ``without`` names what is not there, or the twin has no file.
+        If a recipe of the chain is missing or not TOML, the chain is circular or longer than
+        `LONGEST_CHAIN`, ``without`` names a missing entry, or the twin has no file.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def read_recipe(name_or_path: str | Path, *, twin: str | Path | None = None) -> 
 def _with_twin(
     table: dict[str, Any], name: str, folder: Path, twin: str | Path | None
 ) -> dict[str, Any]:
-    """A table with the numbers of its twin in place of the file that holds them."""
+    """A table with the numbers of its twin in place of the name of the file that holds them."""
     given = table.get("twin") if twin is None else str(twin)
     if not isinstance(given, str):
         return table
@@ -172,7 +172,7 @@ def twin_path(scene: str | Path) -> Path:
 
 
 def _foreign(own: Mapping[str, Any], base: Mapping[str, Any], before: list[str]) -> list[str]:
-    """Bounds of wear that stay those of the scene before, where a recipe names another."""
+    """Bounds of wear still relative to the previous scene, if a recipe names another."""
     scene, other = own.get("scene", base.get("scene")), base.get("scene")
     if other is None or scene == other:
         return before
@@ -181,20 +181,20 @@ def _foreign(own: Mapping[str, Any], base: Mapping[str, Any], before: list[str])
 
 
 def _kept(own: Mapping[str, Any], base: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
-    """Entries of a list that a recipe takes over as they are."""
+    """Entries of a list that a recipe takes over unchanged."""
     key = _LISTS[name]
-    anew = {*(_told(e, key) for e in _tables(own.get(name))), *map(str, own.get("without", []))}
-    return [entry for entry in _tables(base.get(name)) if _told(entry, key) not in anew]
+    anew = {*(_key_of(e, key) for e in _tables(own.get(name))), *map(str, own.get("without", []))}
+    return [entry for entry in _tables(base.get(name)) if _key_of(entry, key) not in anew]
 
 
 def _inherited(
     own: Mapping[str, Any], base: Mapping[str, Any], before: Mapping[str, str]
 ) -> dict[str, str]:
-    """Draws that stay those of a scene before, by path or name."""
+    """Draws inherited from a previous scene, by path or name."""
     other = base.get("scene")
     changed = other is not None and own.get("scene", other) != other
     lists = ("machine", "record", "choice", "confounder")
-    kept = [str(_told(e, _LISTS[name])) for name in lists for e in _kept(own, base, name)]
+    kept = [str(_key_of(e, _LISTS[name])) for name in lists for e in _kept(own, base, name)]
     return {key: before.get(key, str(other)) for key in kept if changed or key in before}
 
 
@@ -207,7 +207,7 @@ def _tables(value: Any) -> list[Mapping[str, Any]]:
 
 
 def _chain(name_or_path: str | Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """A recipe, what it extends, and so on: the place and the table of each."""
+    """A recipe, the one it extends, and so on: place and table of each."""
     reference: str | Path | None = name_or_path
     seen: list[Path] = []
     while reference is not None:
@@ -228,7 +228,7 @@ def _chain(name_or_path: str | Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def _parent(table: Mapping[str, Any], place: Path) -> str | Path | None:
-    """What a recipe extends: a file beside it, else a built-in one or a path."""
+    """The recipe that a recipe extends: a file in its folder, or else a built-in one or a path."""
     parent = table.get("extends")
     if parent is None:
         return None
@@ -239,12 +239,12 @@ def _parent(table: Mapping[str, Any], place: Path) -> str | Path | None:
 
 
 def _refuse_without(own: Mapping[str, Any], base: Mapping[str, Any], place: Path) -> None:
-    """``without`` must be a list of paths and names that the extended recipe has."""
+    """Refuse ``without`` unless it is a list of paths and names that the extended recipe has."""
     left_out = own.get("without", [])
     if not isinstance(left_out, list):
         fault = f"without = {left_out!r} must be a list of paths and names; put it in brackets"
         raise RecipeError(place.stem, [fault])
-    there = [_told(e, key) for name, key in _LISTS.items() for e in _entries(base.get(name, []))]
+    there = [_key_of(e, key) for name, key in _LISTS.items() for e in _entries(base.get(name, []))]
     faults = [
         f"without: {entry!r} is no path and no name of the recipe extended; remove it"
         for entry in left_out
@@ -255,7 +255,7 @@ def _refuse_without(own: Mapping[str, Any], base: Mapping[str, Any], place: Path
 
 
 def name_in(toml_text: str) -> str:
-    """What a recipe or scene calls itself; empty where its text does not say.
+    """Name given in a recipe or scene; empty if its text has none.
 
     Examples
     --------
@@ -264,7 +264,7 @@ def name_in(toml_text: str) -> str:
     """
     try:
         return str(tomllib.loads(toml_text).get("name", ""))
-    except (ValueError, RecursionError):  # ValueError: no TOML, or a number too long
+    except (ValueError, RecursionError):  # ValueError: not TOML, or a number too long
         return ""
 
 
@@ -285,15 +285,15 @@ def merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        Name and description are `own` alone. ``fixed`` is joined key by key. Draws, severities
+        Name and description are those of `own`. ``fixed`` is merged key by key. Draws, severities
         (by path), confounders and held-out regions (by name) that `own` lists in ``without`` are
-        left out; one that it gives itself replaces that of `base`, whole and in its place; new
-        ones follow in their order. Anything else of `own` replaces, correlations as one list.
+        left out; one that `own` gives replaces that of `base` completely and in its place; new ones
+        follow in their order. Everything else in `own` replaces, correlations as one list.
 
     Notes
     -----
-    Order decides which random number a draw receives: replacing in place leaves the numbers of
-    all other draws as they are in `base`.
+    The order determines which random number a draw receives: replacing in place leaves the numbers
+    of all other draws as in `base`.
 
     Examples
     --------
@@ -324,7 +324,7 @@ def _entries(value: Any) -> Any:
 def _remaining(entries: Any, left_out: Sequence[str], key: str) -> Any:
     if not isinstance(entries, list):
         return entries  # refused when it is validated
-    return [entry for entry in entries if _told(entry, key) not in left_out]
+    return [entry for entry in entries if _key_of(entry, key) not in left_out]
 
 
 def _joined(base: Any, own: Any, key: str) -> Any:
@@ -334,13 +334,14 @@ def _joined(base: Any, own: Any, key: str) -> Any:
     left = list(own)
     result = []
     for entry in base:
-        same = [other for other in left if _told(other, key) == _told(entry, key)]
+        same = [other for other in left if _key_of(other, key) == _key_of(entry, key)]
         result += same or [entry]
         left = [other for other in left if other not in same]
     return result + left
 
 
-def _told(entry: Any, key: str) -> Any:
+def _key_of(entry: Any, key: str) -> Any:
+    """Value of an entry's identifying key; None if it is not a table."""
     return entry.get(key) if isinstance(entry, Mapping) else None
 
 
@@ -390,7 +391,7 @@ def _key(key: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    # JSON escapes what TOML wants escaped, but for one control character
+    # JSON escapes all that TOML requires, except for one control character
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -1,4 +1,4 @@
-"""Units of measured channels: declared, converted by the one table of units, or refused."""
+"""Units of measured channels: declared, converted by the common table of units, or refused."""
 
 import difflib
 import math
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...sim.parts.units import UNITS, listed_unit, to_si
 
 FULL_SCALE = "FS"
-"""Unit of a converter's numbers, 1 at its largest; nothing physical, but a declaration."""
+"""Unit of a converter's numbers, 1 at full scale: not physical, but a valid declaration."""
 
 DIMENSIONS = {
     "acceleration": "acceleration",
@@ -22,7 +22,7 @@ DIMENSIONS = {
     "moment": "moment",
     "temperature": "temperature",
 }
-"""Quantity of a channel -> row of the table of units. Mass is none: g is standard gravity here."""
+"""Row of the table of units for each quantity of a channel. Mass is excluded: g is gravity here."""
 
 SAME = {
     "m/s/s": "m/s^2",
@@ -56,7 +56,7 @@ _NUMBER = re.compile(r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?|\.[0-9]+(?:[eE][-
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelUnit:
-    """What one number of a file is worth.
+    """Conversion of one number of a file to SI.
 
     Attributes
     ----------
@@ -89,7 +89,8 @@ def parse_unit(text: str) -> ChannelUnit:
     Raises
     ------
     ValueError
-        The unit is not known, with the nearest that is; or its factor is not > 0 and finite.
+        If the unit is unknown (the nearest known one is named), or its factor is not > 0 and
+        finite.
 
     Examples
     --------
@@ -115,7 +116,7 @@ def parse_unit(text: str) -> ChannelUnit:
 
 
 def parse_sensitivity(text: str) -> ChannelUnit:
-    """Meaning of a volt, by the sensitivity of the sensor.
+    """Conversion of a voltage by the sensitivity of the sensor.
 
     Parameters
     ----------
@@ -125,12 +126,12 @@ def parse_sensitivity(text: str) -> ChannelUnit:
     Returns
     -------
     ChannelUnit
-        With the factor from volts to the SI unit.
+        Unit with the factor from volts to the SI unit.
 
     Raises
     ------
     ValueError
-        It is not voltage per unit, or zero.
+        If it is not voltage per unit, or zero.
 
     Examples
     --------
@@ -154,7 +155,7 @@ def parse_sensitivity(text: str) -> ChannelUnit:
 
 
 def known_unit(text: str) -> bool:
-    """Whether :func:`parse_unit` takes it."""
+    """Whether :func:`parse_unit` accepts the text."""
     try:
         parse_unit(text)
     except ValueError:
@@ -163,7 +164,7 @@ def known_unit(text: str) -> bool:
 
 
 def known_units() -> tuple[str, ...]:
-    """Every unit of the table that a channel may have.
+    """All units of the table that a channel may have.
 
     Examples
     --------
@@ -175,7 +176,7 @@ def known_units() -> tuple[str, ...]:
 
 
 def _split(text: str) -> tuple[float, str]:
-    """Number before a unit, one where there is none, and the unit in the table's signs."""
+    """Number before a unit (1 if there is none), and the unit in the table's notation."""
     plain = " ".join(text.replace("**", "^").translate(_SIGNS).replace("^^", "^").split())
     match = _NUMBER.match(plain)
     # "1/min" begins with a number that belongs to the unit

@@ -1,4 +1,4 @@
-"""Which part of a file is the recording: by its name, by a pattern, or the only one there is."""
+"""The part of a file that is the recording: chosen by name or pattern, or the only one."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from .part import Contents, FilePart, PartChannel, SourceOptions
 
 
 def part_of_record(file: Path, part: FilePart, options: SourceOptions, record: int) -> FilePart:
-    """The part, or one of its rows where these are records."""
+    """The part, or one of its rows if these are records."""
     if options.rows is None:
         return part
     try:
@@ -25,7 +25,7 @@ def part_of_record(file: Path, part: FilePart, options: SourceOptions, record: i
 
 
 def chosen_part(file: Path, contents: Contents, options: SourceOptions, record: int) -> FilePart:
-    """The one that the options choose, or a DataError with the list of what is inside."""
+    """The part chosen by the options, or a DataError that lists the content."""
     names = [part.name for part in contents.parts]
     asked = options.variables or _named_by_channels(names, options)
     wanted = [_fitting(file, pattern, names) for pattern in asked]
@@ -51,24 +51,24 @@ def chosen_part(file: Path, contents: Contents, options: SourceOptions, record: 
         )
     raise DataError(
         f"{file} holds {len(names)}: variable must be one of its arrays: {contents.listing()}; "
-        "choose with variable, once for each channel where each is an array"
+        "choose with variable, once for each channel if each is an array"
     )
 
 
 def wanted_channels(options: SourceOptions) -> Sequence[str]:
-    """Channels that the caller names, else the profile; none for all."""
+    """Channels named by the caller, or else by the profile; none for all."""
     return options.channels or (options.like.channels if options.like else ())
 
 
 def _named_by_channels(names: Sequence[str], options: SourceOptions) -> tuple[str, ...]:
-    """Arrays that the channels to be read are named after, where every channel is one."""
+    """Arrays after which the requested channels are named, if every channel is one."""
     wanted = wanted_channels(options)
     arrays = [entry if entry in names else new_and_old(entry)[1] or entry for entry in wanted]
     return tuple(arrays) if len(names) > 1 and set(arrays) <= set(names) else ()
 
 
 def _fitting(file: Path, pattern: str, names: Sequence[str]) -> str:
-    """The one name that fits a pattern; a name is a pattern that fits itself."""
+    """The one name that matches a pattern; a plain name matches itself."""
     if pattern in names:
         return pattern
     found = [name for name in names if fnmatchcase(name, pattern)]
@@ -80,7 +80,7 @@ def _fitting(file: Path, pattern: str, names: Sequence[str]) -> str:
 
 
 def _by_pattern(part: FilePart, pattern: str) -> FilePart:
-    """A part under what its name has in common with those of other files: the pattern's letters."""
+    """A part named by the letters of the pattern, which names in other files share."""
     common = re.sub(r"\[[^\]]*\]|[*?]", "", pattern).strip("_. ")
     if part.name == pattern or not common:
         return part
@@ -123,7 +123,7 @@ def _merged(file: Path, parts: Sequence[FilePart]) -> FilePart:
 
 
 def _qualified(part: FilePart, row: int) -> PartChannel:
-    """Of several arrays each gives its name to its channel, or to all of them with theirs."""
+    """Channel under the name of its array, or with both names if the array has several channels."""
     channel = part.channels[row]
     if part.named and len(part.channels) > 1:
         return replace(channel, name=f"{part.name}.{channel.name}")

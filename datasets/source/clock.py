@@ -22,20 +22,21 @@ _DAY = 86_400 * _SECOND
 
 
 def stamp_ns(text: str, *, month_first: bool = False) -> int | None:
-    """Nanoseconds of a time stamp, from midnight, or from the year 1 where it has a date.
+    """Nanoseconds of a time stamp since midnight, or since the year 1 if it has a date.
 
     Parameters
     ----------
     text : str
-        ``hh:mm:ss`` with up to nine decimals, behind a date (``2024-05-01``, ``01.05.2024``,
-        ``01/05/2024``) or none, before a zone (``Z``, ``+02:00``) or none.
+        ``hh:mm:ss`` with up to nine decimals, optionally after a date (``2024-05-01``,
+        ``01.05.2024``, ``01/05/2024``) and before a zone (``Z``, ``+02:00``).
     month_first : bool
-        Of dates that end in the year, unless their marks are points.
+        Whether the month comes first in dates that end in the year; dates with points have the day
+        first.
 
     Returns
     -------
     int or None
-        None where it is no time stamp, or no date of the calendar. With a zone it is UTC.
+        None if it is not a time stamp, or not a date of the calendar. With a zone it is UTC.
 
     Examples
     --------
@@ -62,7 +63,7 @@ def stamp_ns(text: str, *, month_first: bool = False) -> int | None:
 
 
 def is_stamp(text: str) -> bool:
-    """Whether a text is a time stamp, the day or the month first.
+    """Whether a text is a time stamp, with the day or the month first.
 
     Examples
     --------
@@ -73,12 +74,13 @@ def is_stamp(text: str) -> bool:
 
 
 def months_first(first: str, last: str) -> bool | None:
-    """Whether dates that end in the year begin with the month, None where nothing tells.
+    """Whether dates that end in the year begin with the month; None if undetermined.
 
     Parameters
     ----------
     first, last : str
-        Stamps of one recording, the later one last. Of the same day they need no answer.
+        Stamps of one recording, the later one last. If they are of the same day, it does not
+        matter.
 
     Examples
     --------
@@ -102,7 +104,7 @@ def months_first(first: str, last: str) -> bool | None:
 
 
 def _day(found: re.Match[str], month_first: bool) -> int | None:
-    """Number of the date, 0 without one, None where the calendar has no such day."""
+    """Number of the date; 0 without one, None if the calendar has no such day."""
     if found["year"]:
         year, month, day = found["year"], found["month"], found["day"]
     elif found["year_last"]:
@@ -118,7 +120,7 @@ def _day(found: re.Match[str], month_first: bool) -> int | None:
 
 
 def stamp_resolution(cells: Iterable[str]) -> float:
-    """Value of the last digit that any of some stamps has [s].
+    """Smallest resolution of some stamps, by their last digits [s].
 
     Examples
     --------
@@ -130,7 +132,7 @@ def stamp_resolution(cells: Iterable[str]) -> float:
 
 
 def is_stamp_pattern(text: str) -> bool:
-    """Whether a unit only says how the time is written, like ``hh:mm:ss.fff``.
+    """Whether a unit is a pattern for the time, like ``hh:mm:ss.fff``.
 
     Examples
     --------
@@ -145,21 +147,21 @@ def stamp_seconds(
     refuse: Callable[[int, str], Exception],
     month_first: bool = False,
 ) -> Callable[[int, int], NDArray[np.float64]]:
-    """Times of stamps since the first one [s], exact to the nanosecond before they are floats.
+    """Times since the first stamp [s], computed to the nanosecond before conversion to float.
 
     Parameters
     ----------
     cells : callable
         Stamps [start, stop).
     refuse : callable
-        Error about an index and a text that is no stamp.
+        Returns the error for an index and a text that is no stamp.
     month_first : bool
         See :func:`stamp_ns`.
 
     Returns
     -------
     callable
-        Seconds [start, stop); times of day go on behind midnight, once.
+        Seconds [start, stop); times of day continue past midnight, once.
     """
     [first_text] = cells(0, 1)
     first = stamp_ns(first_text, month_first=month_first)
@@ -173,7 +175,7 @@ def stamp_seconds(
             if value is None:
                 raise refuse(start + i, text)
             apart = value - first
-            # without a date, what is before the first one is of the next day
+            # without a date, a time before the first one is of the next day
             found[i] = (apart % _DAY if first < _DAY else apart) / _SECOND
         return found
 

@@ -1,4 +1,4 @@
-"""Channels that hold nothing but NaN: inputs that were not connected."""
+"""Channels of NaN only: inputs that were not connected."""
 
 from dataclasses import replace
 
@@ -6,16 +6,17 @@ import numpy as np
 
 from .part import FilePart
 
-_PIECE = 2**16  # samples of a channel looked at in one read
+_PIECE = 2**16  # samples of a channel checked in one read
 
 
 def without_empty(part: FilePart) -> FilePart:
-    """The part without its channels of NaN alone, which it names; all of them if none is left.
+    """The part without its channels of NaN only, which it names; unchanged if none would be left.
 
     Parameters
     ----------
     part : Part
-        A single sample is read of most channels, all samples of those that begin and end with NaN.
+        Part to check. Most channels cost one sample; those that begin and end with NaN are read
+        whole.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Numbers in notations that the text readers do not know, told from words."""
+"""Numbers in notations that the text readers do not support, distinguished from words."""
 
 import re
 from collections.abc import Sequence
@@ -27,17 +27,17 @@ _NOTATIONS = (
 
 
 def unknown_notation(cells: Sequence[str]) -> tuple[str, str, str] | None:
-    """A cell that is a number in a notation of its own, what that is, and the cure.
+    """First cell that is a number in an unsupported notation, the notation, and the cure.
 
     Parameters
     ----------
     cells : sequence of str
-        Of one column that is not read as numbers.
+        Cells of one column that is not read as numbers.
 
     Returns
     -------
     tuple of str or None
-        None where a cell is neither a plain number nor one of those: then the column holds words.
+        None if a cell is neither a plain number nor in such a notation: the column holds words.
 
     Examples
     --------

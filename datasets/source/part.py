@@ -1,4 +1,4 @@
-"""Vocabulary of the readers: what a file holds, what the caller declares, what comes of both."""
+"""Data types of the readers: content of a file, declarations of the caller, and the result."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,38 +13,38 @@ from ...sim.output.recording import DataError
 from ...sim.output.sensor import rate_fault
 
 LARGEST_INFLATED = 2**30
-"""Largest believable content of a compressed file [byte]: beyond it a small file is a trap."""
+"""Largest plausible content of a compressed file [byte]: a larger one may be malicious."""
 
 MOST_CHANNELS = 4096
-"""Beyond it an array is an image or a table, not a recording."""
+"""Largest number of channels; with more, an array is an image or a table, not a recording."""
 
 MOST_ROWS = 100_000
-"""Rows believed of one array to be records."""
+"""Largest number of rows of an array that are taken as records."""
 
 _SHOWN = 24
-"""Parts that a message names before it counts the rest."""
+"""Number of parts named in a message; the others are counted."""
 
 DECLARED = "declared_samples"
-"""Manifest column: samples that a file declares, where it holds fewer of them."""
+"""Manifest column: number of samples that a file declares, if it holds fewer."""
 
 Fetch = Callable[[int, int, tuple[int, ...]], NDArray[Any]]
-"""Numbers as the file holds them [shape=(n_rows, stop - start)], by start, stop and rows."""
+"""Numbers as stored [shape=(n_rows, stop - start)], by start, stop and rows."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
-    """Recordings as a model wants them, for what neither file nor caller says.
+    """Channels, units and rate that a model expects, for what neither file nor caller declares.
 
     Attributes
     ----------
     source : str
-        Where it is from, for messages.
+        Origin, for messages.
     channels : tuple of str
         Names, in order.
     units : mapping
-        Of channels whose unit nobody else declares.
+        Unit of each channel for which no other is declared.
     sample_rate : float
-        [Hz]
+        Sample rate [Hz].
     """
 
     source: str
@@ -55,60 +55,60 @@ class Profile:
 
 @dataclass(frozen=True, kw_only=True)
 class SourceOptions:
-    """What the caller declares about a file that does not say it, and what of it is wanted.
+    """Declarations of the caller about a file, and the selection to read.
 
     Parameters
     ----------
     variable : str or sequence of str, optional
-        Array, data set or group to read, where a file holds several; several of one length
-        become channels of one recording. ``struct.field`` for a field. A pattern (``*_time``) that
-        fits one name of the file names the channel by its letters.
+        Array, data set or group to read if a file holds several; several of one length become
+        channels of one recording. ``struct.field`` for a field. A pattern (``*_time``) that matches
+        one name of the file names the channel by its letters.
     channels : sequence of str
-        Those wanted, in order, under the names that a listing shows; ``new=old`` renames. Where the
-        file names none, new names for all of them will do.
+        Channels to read, in order, under the names shown in a listing; ``new=old`` renames. If the
+        file has no names, new names for all channels suffice.
     fs : float, optional
         Sample rate [Hz].
     unit : str or mapping, optional
-        Unit of every channel, or by name of channel; a number before it is what one number of the
-        file is worth (``"0.5 mV"``). ``"FS"`` leaves integers as parts of full scale. The name
-        of a time column may have one of time.
+        Unit of every channel, or by name of channel; a number before it is the value of one number
+        of the file (``"0.5 mV"``). ``"FS"`` keeps integers as fractions of full scale. The name of
+        a time column may have a unit of time.
     sensitivity : str or mapping, optional
-        Of the sensor on a channel in volts: ``"100 mV/g"``.
+        Sensitivity of the sensor on a channel in volts: ``"100 mV/g"``.
     full_scale : str or mapping, optional
-        What the largest integer of a WAV file is worth: ``"10 V"``, ``"50 g"``.
+        Value of the largest integer of a WAV file: ``"10 V"``, ``"50 g"``.
     delimiter, decimal : str, optional
-        Of a text file: ``","``, ``";"``, ``"tab"``, ``"space"``, …; ``"."`` or ``","``.
+        For a text file: ``","``, ``";"``, ``"tab"``, ``"space"``, …; ``"."`` or ``","``.
     header : int, optional
-        Lines before the numbers of a text file; the last of them names the columns. 0: none.
+        Number of lines before the numbers of a text file; the last of them names the columns. 0:
+        none.
     time_column : str or int, optional
-        Name of the column of times, or its number counted from 1; 0: there is none.
+        Name of the time column, or its number counted from 1; 0: there is none.
     dtype : str, optional
-        Of headerless binary: ``"<int16"``, ``">float32"``, …; ``<`` little-endian, ``>`` big.
+        For headerless binary: ``"<int16"``, ``">float32"``, …; ``<`` little-endian, ``>`` big.
     n_channels : int, optional
-        Of headerless binary.
+        For headerless binary.
     offset : int
         Bytes to skip in headerless binary.
     order : {"interleaved", "blocks"}, optional
-        Of binary and of arrays: sample by sample (time down the rows), or channel by channel.
+        For binary and arrays: sample by sample (time down the rows), or channel by channel.
     record : int
-        Of an array of three dimensions, the index along the first; of rows that are records, the
-        row.
+        Index along the first axis of a three-dimensional array; or the row, if rows are records.
     rows : {"records"}, optional
-        Of text and of arrays of two dimensions: every row is a record of one channel; of arrays
-        every column with ``order="interleaved"``. Several variables become channels.
+        For text and two-dimensional arrays: every row is a record of one channel; for arrays with
+        ``order="interleaved"`` every column. Several variables become channels.
     resample_to : float, optional
         Sample rate to bring the recording to [Hz].
     tacho : str, optional
         Channel that is resampled by the times of its edges.
     partial : bool
-        Of a WAV, TDMS or binary file that is cut short, read the samples that are there.
+        Read the samples of a truncated WAV, TDMS or binary file.
     like : Profile, optional
-        Channels, units and rate where nothing else says them; a rate that differs is refused.
+        Channels, units and rate if not declared otherwise; a rate that differs is refused.
 
     Raises
     ------
     DataError
-        A value is out of its bounds; all faults at once.
+        If a value is out of bounds; all faults at once.
 
     Examples
     --------
@@ -144,7 +144,7 @@ class SourceOptions:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Names asked for; none: the only one there is."""
+        """Names requested; none if there is only one."""
         if self.variable is None:
             return ()
         return (self.variable,) if isinstance(self.variable, str) else tuple(self.variable)
@@ -152,7 +152,7 @@ class SourceOptions:
     def per_channel(
         self, name: Literal["unit", "sensitivity", "full_scale"], channel: str
     ) -> str | None:
-        """What is declared about one channel."""
+        """Declaration about one channel."""
         given: str | Mapping[str, str] | None = getattr(self, name)
         return given.get(channel) if isinstance(given, Mapping) else given
 
@@ -185,7 +185,7 @@ def _option_faults(o: SourceOptions) -> list[tuple[bool, str]]:
         ),
         (
             o.rows not in (None, "records"),
-            f"rows = {o.rows!r} must be 'records'; leave it out for rows that are none",
+            f"rows = {o.rows!r} must be 'records'; leave it out if rows are not records",
         ),
         (o.record < 0, f"record = {o.record} must be >= 0; choose another"),
         (
@@ -197,7 +197,7 @@ def _option_faults(o: SourceOptions) -> list[tuple[bool, str]]:
 
 @dataclass(frozen=True, kw_only=True)
 class PartChannel:
-    """A channel as the file has it: its name, and its unit where the file declares one."""
+    """A channel as in the file: its name, and its unit if the file declares one."""
 
     name: str
     unit: str | None = None
@@ -205,44 +205,44 @@ class PartChannel:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FilePart:
-    """Something in a file that can be one recording; nothing of its signal is read yet.
+    """Part of a file that can be one recording; none of its signal has been read.
 
     Attributes
     ----------
     name : str
-        By which it is chosen; empty where the file holds nothing else.
+        Name by which it is chosen; empty if the file holds nothing else.
     about : str
         Shape or length, for listings.
     channels : tuple of PartChannel
-        As the file has them.
+        Channels as in the file.
     named : bool
-        The names are the file's own.
+        Whether the names are the file's own.
     n_samples : int
-        Per channel.
+        Number of samples per channel.
     fetch : callable
-        Reads some samples of some channels, numbers as the file holds them.
+        Reads some samples of some channels, as numbers of the file.
     sample_rate : float, optional
-        As the file declares it [Hz].
+        Sample rate declared by the file [Hz].
     rate_doubt : float
-        Relative uncertainty of a printed rate; 0 where it is exact.
+        Relative uncertainty of a printed rate; 0 if it is exact.
     rate_note : str
-        Why the file does not declare a rate though it seems to.
+        Reason why an apparent rate in the file does not count.
     rate_seen : float, optional
         Number that would be the rate if it had a unit.
     bits : int
-        Of integers over full scale, 0 for numbers that stand for themselves.
+        Number of bits of integers over full scale; 0 for numbers without scaling.
     conditions : mapping
         Manifest columns that the file declares, in SI.
     known_as : str
         Data set whose documentation declares rate and unit; such a part is chosen first.
     extras : tuple of str
-        Further names that a unit may be declared for: the column of times.
+        Further names for which a unit may be declared: the time column.
     n_records : int
-        Records of this layout beside each other, this one among them.
+        Number of records of this layout, including this one.
     empty : tuple of str
-        Channels of NaN alone, which are left out.
+        Channels of NaN only, which are left out.
     unread : mapping of str to str
-        Columns of numbers in an unknown notation -> what they hold, and the cure.
+        Columns of numbers in an unknown notation, with their content and the cure.
     """
 
     name: str
@@ -264,12 +264,12 @@ class FilePart:
     unread: Mapping[str, str] = field(default_factory=dict)
 
     def row_as_record(self, row: int) -> "FilePart":
-        """One channel as a recording of its own, named like the others.
+        """One channel as a separate recording, named like the others.
 
         Raises
         ------
         DataError
-            There is no such row.
+            If there is no such row.
         """
         count = len(self.channels)
         if row >= count:
@@ -299,9 +299,9 @@ def _nothing() -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contents:
-    """All that a file holds: parts that can be read, and words about what cannot.
+    """Content of a file: parts that can be read, and descriptions of all else.
 
-    ``wanted`` says what to do where nothing can be chosen; ``close`` releases the file.
+    ``wanted`` gives the cure if nothing can be chosen; ``close`` releases the file.
     """
 
     parts: tuple[FilePart, ...]
@@ -309,7 +309,7 @@ class Contents:
     close: Callable[[], None] = _nothing
 
     def listing(self) -> str:
-        """What is inside, for a message."""
+        """Text of the content, for a message."""
         names = [f"{part.name or 'the file'} {part.about}" for part in self.parts]
         if not names:
             names = ["none"]
@@ -329,14 +329,14 @@ class SourceChannel:
     Attributes
     ----------
     name : str
-        Unique in its source.
+        Name, unique in its source.
     unit : str, optional
-        Of the numbers that `Source.read` gives: SI, ``FS``, or None where nothing is declared and
-        the numbers are the file's.
+        Unit of the numbers returned by `Source.read`: SI, ``FS``, or None if nothing is declared
+        and the numbers are the file's.
     quantity : str, optional
-        ``acceleration``, …; None where no unit is declared.
+        ``acceleration``, …; None if no unit is declared.
     unit_in_file : str
-        What was declared, before conversion.
+        Unit as declared, before conversion.
     """
 
     name: str
@@ -354,28 +354,28 @@ class Source:
     path : Path
         The file.
     part : str
-        What in the file; empty where it holds one recording.
+        Part of the file; empty if it holds one recording.
     channels : tuple of SourceChannel
-        Names unique.
+        Channels with unique names.
     sample_rate : float, optional
-        [Hz]; None where neither file nor caller declares it.
+        Sample rate [Hz]; None if neither file nor caller declares it.
     n_samples : int
-        Per channel, >= 1.
+        Number of samples per channel, >= 1.
     conditions : mapping
         Manifest columns that the file declares: ``speed_hz``, ``load_n``, in SI.
     undeclared : tuple of str
-        What is missing before the numbers mean something, each with its cure.
+        Missing declarations, each with its cure.
     named : bool
-        File or caller name the channels.
+        Whether file or caller name the channels.
     n_records : int
-        Records of this layout in the file, this one among them.
+        Number of records of this layout in the file, including this one.
     empty : tuple of str
-        Channels of NaN alone, which are left out.
+        Channels of NaN only, which are left out.
 
     Notes
     -----
-    Only the samples asked for are read, except of compressed MATLAB and NPZ files, which are
-    inflated whole (at most :data:`LARGEST_INFLATED`).
+    Only the requested samples are read, except from compressed MATLAB and NPZ files, which are
+    decompressed completely (at most :data:`LARGEST_INFLATED`).
     """
 
     path: Path
@@ -404,12 +404,12 @@ class Source:
         Returns
         -------
         numpy.ndarray [shape=(n_channels, stop - start)]
-            In the units of `channels`.
+            Samples in the units of `channels`.
 
         Raises
         ------
         DataError
-            The range is not within the recording, the file is damaged there, or a sample is not
+            If the range is not within the recording, the file is damaged there, or a sample is not
             finite.
         """
         end = self.n_samples if stop is None else stop
@@ -418,7 +418,7 @@ class Source:
                 f"{self.path}: samples {start} to {end} must be within 0 to {self.n_samples} and "
                 "at least one; ask for others"
             )
-        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by name
+        with np.errstate(over="ignore", invalid="ignore"):  # overflows are refused by name
             numbers = self.fetch(start, end, self.rows)
         if numbers.shape != (len(self.rows), end - start):
             raise DataError(
@@ -440,7 +440,7 @@ class Source:
             if bad.size:
                 faults.append(
                     f"{self.path}: channel '{channel.name}' is {row[bad[0]]} at index "
-                    f"{start + bad[0]}, must be finite; cut or mend the gap"
+                    f"{start + bad[0]}, must be finite; cut or repair the gap"
                 )
         raise DataError("\n".join(faults))
 
@@ -452,7 +452,7 @@ class Source:
 
 
 def cut(path: Path, size: int, needed: int, *, partial: bool = False) -> DataError:
-    """Error about a file shorter than it says; `partial` where what is there can be read."""
+    """Error about a file shorter than declared; `partial` if the existing samples can be read."""
     more = ", or read what is there with partial" if partial else ""
     return DataError(f"{path} has {size} byte, must be >= {needed}; take an intact copy{more}")
 
@@ -461,7 +461,7 @@ def cut(path: Path, size: int, needed: int, *, partial: bool = False) -> DataErr
 def closed_on_failure(
     path: Path, file: Any, faults: type[Exception] | tuple[type[Exception], ...]
 ) -> Iterator[None]:
-    """Close a file that cannot be read; what its parser raises, of these kinds, is damage."""
+    """Close a file that cannot be read; errors of these kinds from its parser count as damage."""
     try:
         yield
     except DataError:
@@ -473,7 +473,7 @@ def closed_on_failure(
 
 
 def damaged(path: Path, error: BaseException) -> DataError:
-    """Error about a file on which a parser has given up, in one line."""
+    """Error about a file that its parser could not read, in one line."""
     text = " ".join(str(error).split())[:200] or type(error).__name__
     return DataError(f"{path} cannot be read ({text}); take an intact copy")
 
@@ -493,7 +493,7 @@ _MAGIC = (
 
 
 def foreign(path: Path, wanted: str) -> DataError:
-    """Error about a file that does not begin as its suffix says."""
+    """Error about a file whose first bytes do not match its suffix."""
     with path.open("rb") as handle:
         head = handle.read(16)
     if not head:

@@ -1,4 +1,4 @@
-"""Names under which files keep a sample rate, and what a number there declares."""
+"""Names of values that hold a sample rate, and the declaration that such a value makes."""
 
 import re
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ _RATE_NAME = re.compile(r"(?:fs|sr|sampl(?:e|ing)[_ ]?(?:rate|frequency))([_ ]?h
 
 @dataclass(frozen=True, kw_only=True)
 class RateNote:
-    """What a file says of its sample rate.
+    """Statement of a file about its sample rate.
 
     Attributes
     ----------
     declared : float, optional
-        [Hz], where name or value says hertz.
+        Rate [Hz], if name or value contain the unit.
     seen : float, optional
-        A number of no unit: the rate, if it is in hertz.
+        A number without unit: the rate, if it is in hertz.
     note : str
-        Why that declares nothing, and the cure.
+        Reason why it does not declare the rate, and the cure.
     """
 
     declared: float | None = None
@@ -39,14 +39,14 @@ def is_rate_name(name: str) -> bool:
 
 
 def rate_note(name: str, value: float | str | None) -> RateNote:
-    """What a value under the name of a rate declares.
+    """Declaration made by a value under the name of a rate.
 
     Parameters
     ----------
     name : str
-        For which :func:`is_rate_name` holds.
+        Name for which :func:`is_rate_name` holds.
     value : float, str or None
-        A number, or a text with its unit.
+        Number, or text with a unit.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A recording brought to another sample rate while it is read, without aliasing or images."""
+"""Resampling of a recording while it is read, without aliasing or images."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -16,7 +16,7 @@ RATE_IN_FILE = "sample_rate_in_file_hz"
 """Manifest column: rate before resampling."""
 
 BANDWIDTH = "bandwidth_hz"
-"""Manifest column: highest frequency of a resampled signal that the filter has let pass whole."""
+"""Manifest column: highest frequency of a resampled signal that the filter leaves unchanged."""
 
 _MOST_STEPS = 1000  # of a ratio of rates, up or down: the filter grows with it
 _EXACT = 1e-6  # relative error of a rate, a hundredth of a line in 10,000 lines
@@ -32,29 +32,29 @@ def resampled(source: Source, rate: float | None, tacho: str | None = None) -> S
     Parameters
     ----------
     source : Source
-        Its rate declared.
+        Source with a declared rate.
     rate : float or None
-        Wanted [Hz]; None leaves it as it is.
+        Rate wanted [Hz]; None keeps the present one.
     tacho : str, optional
-        Channel that is resampled by its edges, not by the filter.
+        Channel that is resampled by its edges instead of the filter.
 
     Returns
     -------
     Source
-        Read piece by piece like the first; the rate of the file and the band that it holds are
-        among its conditions. A raised rate adds samples, no band.
+        Source read piece by piece like the original; the rate of the file and the remaining
+        bandwidth are among its conditions. A higher rate adds samples, but no bandwidth.
 
     Raises
     ------
     DataError
-        The ratio of the rates is of too large whole numbers.
+        If the ratio of the rates needs too large whole numbers.
 
     Notes
     -----
-    Polyphase, with a linear-phase filter (Kaiser window): flat to 0.01 dB up to 0.9 of the
-    lower of both Nyquist frequencies, 80 dB down from it on. The samples do not depend on the
-    pieces in which they are read. Before the first and after the last sample of the file the signal
-    counts as 0, which fades the first and last 64 samples of the lower rate.
+    Polyphase, with a linear-phase filter (Kaiser window): flat to 0.01 dB up to 0.9 of the lower of
+    both Nyquist frequencies, 80 dB down from it on. The samples do not depend on the pieces in
+    which they are read. Before the first and after the last sample of the file the signal counts as
+    0, which fades the first and last 64 samples of the lower rate.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def _filter(up: int, down: int) -> NDArray[np.float64]:
 
 
 class _Resampling:
-    """Fetches samples at the new rate: those of the file that they are made of, no more."""
+    """Fetches samples at the new rate from just the samples of the file that they need."""
 
     def __init__(self, source: Source, ratio: Fraction) -> None:
         self.source = source
@@ -136,7 +136,7 @@ class _Resampling:
         from scipy.signal import resample_poly
 
         # whole blocks: `down` samples of the file become `up` new ones
-        margin = _HALF_LENGTH // min(self.up, self.down) + 2  # half the filter, in them
+        margin = _HALF_LENGTH // min(self.up, self.down) + 2  # half the filter, in blocks
         block = max(0, start // self.up - margin)
         last = min(self.source.n_samples, (stop // self.up + 1 + margin) * self.down)
         numbers = self.source.fetch(block * self.down, last, rows).astype(np.float64)

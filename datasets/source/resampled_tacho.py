@@ -1,7 +1,7 @@
-"""A tacho at another sample rate: its pulses drawn anew from the times of their edges.
+"""A tacho at another sample rate: its pulses are redrawn from the times of their edges.
 
-A filter would ring at every edge, and an edge moves by a part of a sample with it; the times of
-the edges are all that a tacho says.
+A filter would ring at every edge and move it by part of a sample; a tacho carries no information
+but the times of its edges.
 """
 
 from collections.abc import Callable
@@ -21,24 +21,24 @@ Read = Callable[[int, int], NDArray[np.float64]]
 
 _PIECE = 2**20  # samples read at once
 _RAMP = 1.0  # new samples on either side of an edge: the two around it then lie on one line
-_LEAST = 3.0  # new samples that a pulse, and the gap behind it, must last to show its level
+_LEAST = 3.0  # new samples that a pulse, and the gap after it, must last to reach its level
 
 
 class ResampledTacho:
     """Pulses at a new rate, each edge a ramp of two samples through the time of the old one.
 
-    :func:`~..features.order.pulse_times` finds the rising edges where it found them at the rate of
-    the file: those of a sampled logic level lie as smoothly here, and no more by the samples of the
-    file. A pulse shorter than three new samples is made as long.
+    :func:`~..features.order.pulse_times` finds the rising edges at the same times as at the rate of
+    the file: those of a sampled logic level are smoothed here, and no longer tied to the samples of
+    the file. A pulse shorter than three new samples is lengthened to three.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        Path for messages.
     read : callable
-        Samples of the file.
+        Reads samples of the file.
     n_samples : int
-        Of the file.
+        Number of samples of the file.
     ratio : float
         New rate over that of the file.
     """
@@ -53,14 +53,14 @@ class ResampledTacho:
         Raises
         ------
         DataError
-            Pulses follow one another too fast for the rate.
+            If pulses follow one another too fast for the rate.
         """
         times, levels = self._corners
         return np.interp(np.arange(start, stop), times, levels)
 
     @cached_property
     def _corners(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times [new samples] and levels of the corners between which the signal is straight."""
+        """Times [new samples] and levels of the corners of the piecewise linear signal."""
         low, high = self._extremes
         middle = (low + high) / 2
         if not low < middle < high:
@@ -80,7 +80,7 @@ class ResampledTacho:
         return times, np.where(steps, high, low)
 
     def _ends(self, rise: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Ends of the pulses that begin at `rise`, none for one that does not end."""
+        """Ends of the pulses that begin at `rise`; a pulse without an end has none."""
         gaps = np.diff(rise)
         if gaps.size and gaps.min() < 2 * _LEAST:
             raise DataError(
@@ -110,7 +110,7 @@ class ResampledTacho:
             places = np.flatnonzero(sides)
             known = np.concatenate([[state], sides[places]])
             arrived = start + places[(known[:-1] < 0) & (known[1:] > 0)]
-            # every arrival has a crossing before it, perhaps in the piece before
+            # each rise has a crossing before it, perhaps in the previous piece
             found.append(crossings[np.searchsorted(crossings.before[1:], arrived, side="left")])
             state, last = int(known[-1]), crossings[-1:]
         low, high = sorted(sign * extreme for extreme in self._extremes)
@@ -124,7 +124,7 @@ class ResampledTacho:
     def _crossings(
         self, start: int, stop: int, level: float, sign: float
     ) -> tuple["_Crossings", NDArray[np.float64]]:
-        """Where samples [start, stop) times `sign` rise through a level, and these samples."""
+        """Upward crossings of a level by samples [start, stop) times `sign`, and the samples."""
         first, past = max(0, start - 1), min(stop + 2, self.n_samples)
         wide = np.full(stop - start + 3, np.nan)
         wide[first - start + 1 : past - start + 1] = sign * self.read(first, past)
@@ -136,14 +136,14 @@ class ResampledTacho:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Crossings:
-    """Rises through a level.
+    """Upward crossings of a level.
 
     Attributes
     ----------
     before : numpy.ndarray [shape=(n,)]
         Last sample below the level.
     around : numpy.ndarray [shape=(n, 4)]
-        Samples from the one in front of that to the two behind it, NaN outside the file.
+        Samples from the one before that to the two after it, NaN outside the file.
     """
 
     before: NDArray[np.intp]
@@ -153,7 +153,7 @@ class _Crossings:
         return _Crossings(before=self.before[key], around=self.around[key])
 
     def and_then(self, other: "_Crossings") -> "_Crossings":
-        """Both, one behind the other."""
+        """Both sets of crossings, one after the other."""
         return _Crossings(
             before=np.concatenate([self.before, other.before]),
             around=np.concatenate([self.around, other.around]),

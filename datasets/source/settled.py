@@ -1,4 +1,4 @@
-"""What the numbers of a part mean: rate, channels and units, settled between file and caller."""
+"""Meaning of the numbers of a part: rate, channels and units, from file and caller together."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -15,18 +15,18 @@ from .part import MOST_CHANNELS, FilePart, Profile, Source, SourceChannel, Sourc
 
 
 def refuse_unread(file: Path, part: FilePart, options: SourceOptions) -> None:
-    """Numbers must not be left out like words, unless the channels are chosen without them."""
+    """Refuse unreadable numbers, unless the channels are chosen without them."""
     wanted = wanted_channels(options)
     chosen = {new_and_old(entry)[1] or entry for entry in wanted}
-    told = [text for name, text in part.unread.items() if not wanted or name in chosen]
-    if told:
-        raise DataError("\n".join(f"{file}: {text}" for text in told))
+    faults = [text for name, text in part.unread.items() if not wanted or name in chosen]
+    if faults:
+        raise DataError("\n".join(f"{file}: {text}" for text in faults))
 
 
 def settled_source(
     file: Path, part: FilePart, options: SourceOptions, close: Callable[[], None]
 ) -> Source:
-    """Part and options together; every fault at once."""
+    """Source from a part and the options; all faults at once."""
     faults: list[str] = []
     missing: list[str] = []
     rate = _rate(part, options, faults, missing)
@@ -34,7 +34,7 @@ def settled_source(
     _refuse_unlike(rate, options, faults)
     whose = "" if options.channels or like is None else f" (of {like.source})"
     rows, names = _rows(part, wanted_channels(options), faults, whose)
-    _refuse_strangers(part, options, names, faults)
+    _refuse_unknown_names(part, options, names, faults)
     meanings = [
         _meaning(part, row, name, options, faults, missing)
         for row, name in zip(rows, names, strict=True)
@@ -89,7 +89,7 @@ def _rate(
 
 
 def _refuse_other_rate(part: FilePart, like: Profile, faults: list[str]) -> None:
-    """The rate of a profile must not stand for another that the file seems to have."""
+    """Refuse to replace a different rate that the file seems to have by that of a profile."""
     if part.rate_seen is not None and abs(part.rate_seen / like.sample_rate - 1) > _SAME_RATE:
         faults.append(
             f"sample rate = {like.sample_rate:.10g} Hz of {like.source} stands for what the file "
@@ -98,26 +98,26 @@ def _refuse_other_rate(part: FilePart, like: Profile, faults: list[str]) -> None
 
 
 def _refuse_unlike(rate: float | None, options: SourceOptions, faults: list[str]) -> None:
-    """Refuse a rate that is not the profile's, unless the caller asks for one."""
+    """Refuse a rate that differs from the profile's, unless the caller requests one."""
     if options.like is None or rate is None or options.resample_to is not None:
         return
     wanted = options.like.sample_rate
     if abs(rate / wanted - 1) > _SAME_RATE:
         cure = f"give --resample-to {wanted:.10g}"
         if rate < wanted:
-            cure = "record as fast: a higher rate adds no band to samples that are there"
+            cure = "record at that rate: resampling upwards adds no bandwidth"
         faults.append(
             f"sample rate = {rate:.10g} Hz must be {wanted:.10g} Hz, as in {options.like.source}; "
             f"{cure}"
         )
 
 
-_SAME_RATE = 1e-5  # relative, as of rates that printed times tell
+_SAME_RATE = 1e-5  # relative, as for rates derived from printed times
 _OTHER_RATE = "take an intact copy, or correct the unit of the time"
 
 
 def _whole(rate: float, doubt: float) -> float:
-    """The only whole number of hertz that the printed digits allow, else the rate as it is."""
+    """The only whole number of hertz that the printed digits allow, or else the rate unchanged."""
     if not math.isfinite(rate) or math.ceil(rate * (1 - doubt)) != math.floor(rate * (1 + doubt)):
         return rate
     return float(math.ceil(rate * (1 - doubt)))
@@ -126,7 +126,7 @@ def _whole(rate: float, doubt: float) -> float:
 def _rows(
     part: FilePart, wanted: Sequence[str], faults: list[str], whose: str
 ) -> tuple[list[int], list[str]]:
-    """Which rows of the part, under which names; `whose` the wanted ones are, for messages."""
+    """Rows of the part to read, and their names; `whose` is the origin of names, for messages."""
     there = [channel.name for channel in part.channels]
     rows, names = list(range(len(there))), list(there)
     if len(there) > MOST_CHANNELS or not there:
@@ -165,10 +165,10 @@ def _rows(
 _SHOWN_NAMES = 8
 
 
-def _refuse_strangers(
+def _refuse_unknown_names(
     part: FilePart, options: SourceOptions, names: Sequence[str], faults: list[str]
 ) -> None:
-    """What is declared by name must be about a channel that is there, or was."""
+    """Refuse declarations for names that are not channels, now or before renaming."""
     known = {*names, *(channel.name for channel in part.channels), *part.extras, *part.empty}
     for what in _MEANINGS:
         given = getattr(options, what)
@@ -182,7 +182,7 @@ _MEANINGS: tuple[Literal["unit", "sensitivity", "full_scale"], ...] = (
     "sensitivity",
     "full_scale",
 )
-"""Options that say what a number is worth."""
+"""Options that declare the value of a number."""
 
 
 def _meaning(
@@ -193,7 +193,7 @@ def _meaning(
     faults: list[str],
     missing: list[str],
 ) -> tuple[SourceChannel, float]:
-    """Channel in SI and factor to it."""
+    """Channel in SI and the factor to it."""
     declared = part.channels[row].unit
     given = options.per_channel("unit", name)
     blank = SourceChannel(name=name, unit_in_file=declared or "")
@@ -214,7 +214,7 @@ def _meaning(
         return blank, 1.0
     except ValueError as error:
         told = (options.per_channel(what, name) for what in _MEANINGS)
-        # what the file says wrongly can still be listed, and be replaced by the caller
+        # a wrong declaration in the file can still be listed, and be replaced by the caller
         quiet = all(text is None for text in told)
         (missing if quiet else faults).append(f"channel '{name}': {error}")
         return blank, 1.0
@@ -225,7 +225,7 @@ def _meaning(
 
 
 def _differ(declared: str, given: str) -> bool:
-    """Two declarations contradict each other; one that nobody understands does not."""
+    """Whether two declarations contradict each other; one that cannot be parsed does not."""
     try:
         known = parse_unit(declared)
     except ValueError:
@@ -237,7 +237,7 @@ def _differ(declared: str, given: str) -> bool:
 
 
 def _unit_of(part: FilePart, text: str | None, full_scale: str | None) -> tuple[ChannelUnit, str]:
-    """Meaning of a number of the file, and the words for it."""
+    """Unit of a number of the file, and its text."""
     if part.bits == 0:
         if full_scale is not None:
             raise ValueError(
@@ -264,7 +264,7 @@ def _unit_of(part: FilePart, text: str | None, full_scale: str | None) -> tuple[
 
 
 def _sensed(unit: ChannelUnit, origin: str, sensitivity: str | None) -> tuple[ChannelUnit, str]:
-    """What the sensor measured, of a channel in volts."""
+    """Quantity that the sensor measured, for a channel in volts."""
     if sensitivity is None:
         return unit, origin
     sensor = parse_sensitivity(sensitivity)

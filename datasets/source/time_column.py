@@ -1,4 +1,4 @@
-"""Sample rate from a column of times: even within its print, or refused with the jitter."""
+"""Sample rate from a time column: even within its printed digits, or refused with the jitter."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...sim.output.recording import DataError
 
 MOST_JITTER = 0.01
-"""Part of a step that a time may be off the even grid, beyond its last digit.
+"""Largest deviation of a time from the even grid, in steps, beyond its last digit [-].
 
 At a quarter of the sample rate it is a phase error of 0.016 rad, an amplitude error below 2e-4.
 """
@@ -23,14 +23,14 @@ _PRINTED = re.compile(r"[-+]?[0-9]*(?:[.,]([0-9]*))?(?:[eEdD]([-+]?[0-9]+))?")
 
 @dataclass(frozen=True, kw_only=True)
 class Clock:
-    """What a column of times says.
+    """Result of a time column.
 
     Attributes
     ----------
     step : float
-        Mean step, in the unit of the column, > 0.
+        Mean step > 0, in the unit of the column.
     doubt : float
-        Relative uncertainty of it that the last printed digit leaves.
+        Relative uncertainty of the step due to the last printed digit.
     """
 
     step: float
@@ -46,7 +46,7 @@ def even_rate(
     *,
     place: Callable[[int], str] = "index {}".format,
 ) -> Clock:
-    """Step of times that are even, checked piece by piece.
+    """Step of evenly spaced times, checked piece by piece.
 
     Parameters
     ----------
@@ -55,17 +55,17 @@ def even_rate(
     times : callable
         Times [start, stop).
     count : int
-        How many there are.
+        Number of times.
     resolution : float
         Value of the last printed digit, 0 for binary numbers; same unit as the times.
     place : callable
-        Value and line of the time at an index, for messages.
+        Text with value and line of the time at an index, for messages.
 
     Raises
     ------
     DataError
-        Fewer than two, not finite, or not rising, with those that do not; or not even beyond what
-        rounding to the last digit explains, with the jitter measured.
+        If there are fewer than two, or they are not finite or not rising (the offending ones are
+        named), or they are uneven beyond rounding of the last digit (the jitter is given).
 
     Examples
     --------
@@ -83,7 +83,7 @@ def even_rate(
         raise DataError(
             f"{path}: times of column {name!r} go from {first:g} to {last:g}, must rise; {cure}"
         )
-    # rounding to more than half a step would hide a lost sample; even times may be exact yet
+    # rounding to more than half a step would hide a lost sample; even times may still be exact
     rounding = resolution if resolution <= step / 2 else 0.0
     limit = MOST_JITTER * step + rounding + 2 * np.spacing(max(abs(first), abs(last)))
     jitter, at = _jitter(times, count, first, step)
@@ -114,7 +114,7 @@ def _refuse_repeats(
         places += (start + 1 + np.flatnonzero(np.diff(times(start, stop)) <= 0)).tolist()
     if not places:
         return
-    shown = [f"{place(i)} behind {place(i - 1)}" for i in places[:_SHOWN]]
+    shown = [f"{place(i)} after {place(i - 1)}" for i in places[:_SHOWN]]
     more = f" and {len(places) - _SHOWN} more" if len(places) > _SHOWN else ""
     raise DataError(
         f"{path}: times of column {name!r} must rise{coarse}, do not at {len(places)} of {count}: "
@@ -128,7 +128,7 @@ _SHOWN = 3  # times that a message names
 def _jitter(
     times: Callable[[int, int], NDArray[np.float64]], count: int, first: float, step: float
 ) -> tuple[float, int]:
-    """Largest distance from the even grid, NaN where a time is none, and where it is."""
+    """Largest distance from the even grid (NaN if a time is NaN), and its index."""
     worst, at = 0.0, 0
     for start in range(0, count, _BLOCK):
         stop = min(start + _BLOCK, count)
@@ -142,7 +142,7 @@ def _jitter(
 
 
 def printed_resolution(cells: Iterable[str]) -> float:
-    """Value of the last digit that any of some printed numbers has.
+    """Smallest resolution of some printed numbers, by their last digits.
 
     Examples
     --------

@@ -21,9 +21,9 @@ def group_split(
     groups : array_like [shape=(n_records,)]
         Machine of each record.
     test_fraction : float
-        Share of the groups that goes to the test side, 0 < share < 1; at least one on each side.
+        Share of the groups on the test side, 0 < share < 1; at least one group on each side.
     seed : int
-        Of the choice.
+        Seed of the choice.
 
     Returns
     -------
@@ -33,7 +33,7 @@ def group_split(
     Raises
     ------
     DataError
-        The fraction is out of bounds, or there is only one group.
+        If the fraction is out of bounds, or there is only one group.
 
     Examples
     --------
@@ -59,18 +59,18 @@ def group_folds(groups: ArrayLike, *, n: int = 5, seed: int = 0) -> list[tuple[I
     n : int
         Number of folds, 2 <= n <= number of groups.
     seed : int
-        Of the choice.
+        Seed of the choice.
 
     Returns
     -------
     list of (train, test)
-        Record numbers, rising; each record is in one test side. The numbers of groups in two
-        test sides differ by one at most.
+        Record numbers, rising; each record is in one test side. The numbers of groups in two test
+        sides differ by at most one.
 
     Raises
     ------
     DataError
-        There are fewer groups than folds, or `n` is below two.
+        If there are fewer groups than folds, or `n` is below two.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def condition_split(
     values : array_like [shape=(n_records,)]
         Condition of each record, for example ``speed_hz``; finite.
     low, high : float
-        Held out where ``low <= value <= high`` [unit of `values`].
+        Range held out: ``low <= value <= high`` [unit of `values`].
     groups : array_like [shape=(n_records,)], optional
         Machine of each record: other records of held-out machines are in neither side.
 
@@ -106,7 +106,7 @@ def condition_split(
     Raises
     ------
     DataError
-        A value is not finite, the range is reversed, or a side is empty.
+        If a value is not finite, the range is reversed, or a side is empty.
 
     Examples
     --------
@@ -128,10 +128,10 @@ def region_split(
     Parameters
     ----------
     columns : mapping of str to array_like [shape=(n_records,)]
-        Conditions or severities of each record, finite where they are bounded.
+        Conditions or severities of each record, finite if they are bounded.
     bounds : mapping of str to (float, float)
-        Of one or more of `columns`: held out where ``low <= value <= high`` in all of them [unit
-        of the column]; a bound may be infinite.
+        Ranges of one or more of `columns`; records with ``low <= value <= high`` in all of them are
+        held out [unit of the column]; a bound may be infinite.
     groups : array_like [shape=(n_records,)], optional
         Machine of each record: other records of held-out machines are in neither side.
 
@@ -143,7 +143,7 @@ def region_split(
     Raises
     ------
     DataError
-        A bounded value is not finite, a range is reversed, or a side is empty.
+        If a bounded value is not finite, a range is reversed, or a side is empty.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def time_split(
 ) -> tuple[Index, Index]:
     """Train on the early part of lives and test on the late part, for runs to failure.
 
-    Early is a record taken at most `early` times the operating hours of its machine's last record.
+    A record is early up to `early` times the operating hours of its machine's last record.
 
     Parameters
     ----------
@@ -211,11 +211,11 @@ def time_split(
     early : float
         Share of each life that is early, 0 < share < 1.
     test_fraction : float, optional
-        Share of the machines that is tested on, as of :func:`group_split`: then only the late
-        records of these are tested, and only the early records of the others trained on. Without
+        Share of the machines to test, as for :func:`group_split`: then only the late records of
+        these are tested, and only the early records of the others are used for training. Without
         it, every machine is on both sides: early records train, late ones test.
     seed : int
-        Of the choice of machines.
+        Seed of the choice of machines.
 
     Returns
     -------
@@ -225,7 +225,7 @@ def time_split(
     Raises
     ------
     DataError
-        Hours are negative or not finite, a share is out of bounds, or a side is empty.
+        If hours are negative or not finite, a share is out of bounds, or a side is empty.
 
     Examples
     --------
@@ -240,7 +240,9 @@ def time_split(
         raise DataError(f"early = {early} must be > 0 and < 1; try 0.6")
     if not (np.isfinite(age) & (age >= 0)).all():
         bad = int(np.count_nonzero(~(np.isfinite(age) & (age >= 0))))
-        raise DataError(f"{bad} operating hours are negative or not finite, must be 0; mend them")
+        raise DataError(
+            f"{bad} operating hours are negative or not finite, must be 0; correct them"
+        )
     _, machine = np.unique(labels, return_inverse=True)
     last = np.zeros(machine.max(initial=-1) + 1)
     np.maximum.at(last, machine, age)
@@ -271,7 +273,7 @@ def check_no_leak(groups: ArrayLike, train: Sequence[int] | Index, test: Any) ->
     Raises
     ------
     DataError
-        A group is on both sides; the first few are named.
+        If a group is on both sides; the first few are named.
 
     Examples
     --------

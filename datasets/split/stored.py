@@ -1,4 +1,4 @@
-"""Splits stored in a data set file by name, and those that every generated file gets."""
+"""Splits stored in a data set file by name, and the default splits of generated files."""
 
 import hashlib
 import json
@@ -28,27 +28,27 @@ from ..recipe.text import RecipeError
 from .rules import Index, check_no_leak, group_split, region_split, time_split
 
 LOADS = ("discharge_pressure_pa", "static_load_n", "thrust_n", "hull_deflection_m")
-"""Manifest columns that say how loaded a machine is; a data set's first one is its load."""
+"""Manifest columns for the load of a machine; the first one present is used."""
 
 HOURS = "operating_hours"
 """Manifest column of a run to failure."""
 
 BEYOND = 0.8
-"""Records in the largest fifth of a condition, severity or geometry are held out by default."""
+"""By default, records in the largest fifth of a condition, severity or geometry are held out."""
 
 TEST_FRACTION = 0.25
-"""Share of the machines that is held out by default."""
+"""Default share of the machines held out."""
 
 EARLY = 0.6
-"""Share of a life that is trained on by default, where the rest of it is tested."""
+"""Default share of a life used for training; the rest is tested."""
 
 _NAME = re.compile("[a-z0-9][a-z0-9_-]{0,63}")
-_ROUNDING = 1e-9  # a value drawn anew goes the same way through text and back
+_ROUNDING = 1e-9  # a redrawn value goes through the same conversion to text and back
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Split:
-    """Which records train and which test, and how that was decided.
+    """Training and test records, and how they were chosen.
 
     Attributes
     ----------
@@ -59,11 +59,11 @@ class Split:
     train, test : numpy.ndarray [shape=(n_train,)], [shape=(n_test,)]
         Record numbers; a record may be in neither.
     text : str
-        How it was made, for people.
+        Readable description.
     about : mapping
-        The same for programs: ``seed``, ``bounds`` by column, shares.
+        Its parameters for programs: ``seed``, ``bounds`` by column, shares.
     machines_apart : bool
-        False where a machine is on both sides by design.
+        False if machines are on both sides by design.
     """
 
     name: str
@@ -94,18 +94,18 @@ class Split:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drawn:
-    """What a data set's splits are made from.
+    """Data from which splits of a data set are made.
 
     Attributes
     ----------
     columns : mapping of str to numpy.ndarray [shape=(n_records,)]
         The manifest, as a data frame or a structured array.
     severity : str
-        Column of the primary severity; empty without any.
+        Column of the primary severity; empty if there is none.
     recipe : Recipe or None
-        What it was drawn from; None for a measured set.
+        Recipe of the set; None for a measured set.
     seed : int
-        Of the data set.
+        Seed of the data set.
     """
 
     columns: Any
@@ -130,7 +130,7 @@ class Drawn:
         Raises
         ------
         DataError
-            There is no such column, or it holds text.
+            If there is no such column, or it holds text.
         """
         if name not in self.names:
             raise DataError(f"column = {name!r} must be one of {', '.join(self.names)}; choose one")
@@ -146,24 +146,24 @@ class Drawn:
 
 
 def machine_draws(drawn: Drawn) -> tuple[str, NDArray[np.float64]]:
-    """A parameter of the machine that the manifest lacks, drawn anew from recipe and seed.
+    """A parameter of the machine that the manifest lacks, redrawn from recipe and seed.
 
     Parameters
     ----------
     drawn : Drawn
-        Of a generated set.
+        Data of a generated set.
 
     Returns
     -------
     path : str
-        The first number that the recipe draws once per machine and that is no condition.
+        Path of the first number that is drawn once per machine and is not a condition.
     values : numpy.ndarray [shape=(n_records,)]
-        [unit of the scene's value]
+        Values [unit of the scene's value].
 
     Raises
     ------
     DataError
-        Nothing is drawn per machine, or what is drawn is not what the file holds.
+        If nothing is drawn per machine, or the draw differs from the file.
     """
     recipe = drawn.recipe
     known = () if recipe is None else tuple(recipe.conditions.values())
@@ -171,29 +171,29 @@ def machine_draws(drawn: Drawn) -> tuple[str, NDArray[np.float64]]:
     path = next((axis.path for axis in axes if axis.path not in known), None)
     if recipe is None or path is None:
         raise DataError("geometry: 0 numbers are drawn per machine, must be >= 1; use region")
-    # not the samples: each holds a scene
+    # not `sample_records`, each of whose samples holds a scene
     by_group = {sample.group: float(sample.drawn[path]) for sample in machine_samples(drawn)}
     groups = np.asarray(drawn.columns["group"]).tolist()
     return path, np.array([by_group[group] for group in groups])
 
 
 def machine_samples(drawn: Drawn) -> Iterator[Sample]:
-    """First record of each machine, drawn anew from recipe and seed.
+    """First record of each machine, redrawn from recipe and seed.
 
     Parameters
     ----------
     drawn : Drawn
-        Of a generated set.
+        Data of a generated set.
 
     Yields
     ------
     Sample
-        In rising order of record number.
+        Samples in rising order of record number.
 
     Raises
     ------
     DataError
-        There is no recipe, or what is drawn is not what the file holds.
+        If there is no recipe, or the draw differs from the file.
     """
     if drawn.recipe is None:
         raise DataError("recipe: the file has none that can draw its machines again; use region")
@@ -216,7 +216,7 @@ def _refuse_other_draw(drawn: Drawn, sample: Sample) -> None:
         )
 
 
-# --- one kind of split each; all take what is drawn and give a split or refuse
+# --- one function for each kind of split; all take a Drawn and return a split or refuse
 
 
 def _machine(drawn: Drawn, *, share: float = TEST_FRACTION, seed: int | None = None) -> Split:
@@ -266,11 +266,11 @@ def _range_text(column: str, low: float, high: float) -> str:
 
 
 def _finite(end: float) -> float | None:
-    return None if np.isinf(end) else float(end)  # JSON knows no infinity
+    return None if np.isinf(end) else float(end)  # JSON has no infinity
 
 
 def _beyond(drawn: Drawn, kind: str, choices: Sequence[str]) -> Split:
-    """Extrapolation: the largest values of a column are tested, all below trained on."""
+    """Extrapolation: the largest values of a column are tested, all lower ones are for training."""
     column = next((name for name in choices if name in drawn.names), None)
     if column is None:
         raise DataError(f"{kind}: the manifest has none of {', '.join(choices)}; use region")
@@ -278,7 +278,7 @@ def _beyond(drawn: Drawn, kind: str, choices: Sequence[str]) -> Split:
 
 
 def _largest(values: NDArray[Any]) -> tuple[float, float]:
-    """Bounds of what is held out of these values."""
+    """Bounds of the values to hold out."""
     if values.size == 0:
         raise DataError(
             "0 records are usable, must be >= 1: all failed; see the manifest's status for why"
@@ -328,14 +328,14 @@ KINDS: dict[str, Callable[..., Split]] = {
     "time-same-machines": partial(_time, apart=False),
     "time-other-machines": partial(_time, apart=True),
 }
-"""Kind of split -> what makes it of what is drawn. A new one is one row."""
+"""Function that makes each kind of split. A new one is one row."""
 
 SEEDED = ("machine", "time-same-machines", "time-other-machines")
 """Kinds that take a share and a seed."""
 
 
 def split_names(recipe: Recipe) -> tuple[str, ...]:
-    """Names that a data set of this recipe may have splits of; place is laid out for them.
+    """Names of the splits that a data set of this recipe may have; space is reserved for them.
 
     Examples
     --------
@@ -349,7 +349,7 @@ def split_names(recipe: Recipe) -> tuple[str, ...]:
 
 
 def default_splits(drawn: Drawn) -> dict[str, Split]:
-    """Every split that the data set has the records for, and those its recipe declares.
+    """All splits that the data set has the records for, and those its recipe declares.
 
     Parameters
     ----------
@@ -359,8 +359,8 @@ def default_splits(drawn: Drawn) -> dict[str, Split]:
     Returns
     -------
     dict of str to Split
-        By name. One declared under the name of a kind takes its place. A split with an empty side
-        is left out.
+        Splits by name. A declared split replaces a kind of the same name. A split with an empty
+        side is left out.
     """
     makers = dict(KINDS)
     for region in drawn.recipe.held_out if drawn.recipe else ():
@@ -371,7 +371,7 @@ def default_splits(drawn: Drawn) -> dict[str, Split]:
     for name, make in makers.items():
         try:
             found[name] = make(drawn)
-        except DataError:  # too few machines, a column that is not varied, not a run to failure
+        except DataError:  # too few machines, a column that does not vary, or not a run to failure
             continue
     return found
 
@@ -385,7 +385,7 @@ def make_split(
     share: float | None = None,
     seed: int | None = None,
 ) -> Split:
-    """One split, as a person asks for it.
+    """One split with given parameters.
 
     Parameters
     ----------
@@ -394,13 +394,13 @@ def make_split(
     kind : str
         Key of `KINDS`, or ``region``.
     name : str, optional
-        To store it under; its kind unless given.
+        Name under which it is stored; by default its kind.
     bounds : mapping, optional
-        Of a region: column -> (low, high), all of which a held-out record lies in.
+        Range (low, high) by column, for a region; a held-out record lies in all of them.
     share : float, optional
-        Of the machines that are tested, or of a life that is trained on.
+        Share of the machines to test, or of a life used for training.
     seed : int, optional
-        Of the choice of machines; that of the data set unless given.
+        Seed of the choice of machines; by default that of the data set.
 
     Returns
     -------
@@ -409,7 +409,7 @@ def make_split(
     Raises
     ------
     DataError
-        The arguments do not fit the kind, or a side would be empty.
+        If the arguments do not fit the kind, or a side would be empty.
     """
     faults = []
     if kind not in KINDS and kind != "region":
@@ -431,7 +431,7 @@ def make_split(
 
 
 def drawn_of(data: DataSet) -> Drawn:
-    """What splits of a finished file are made from.
+    """Data for the splits of a finished file.
 
     Parameters
     ----------
@@ -441,7 +441,7 @@ def drawn_of(data: DataSet) -> Drawn:
     Returns
     -------
     Drawn
-        Without a recipe where the file's own cannot be read any more.
+        Without a recipe if that of the file can no longer be read.
     """
     head = data.attributes
     return Drawn(
@@ -453,7 +453,7 @@ def drawn_of(data: DataSet) -> Drawn:
 
 
 def _recorded(head: Attributes) -> Recipe | None:
-    """Recipe of a data set; None where there is none, or it is of another version."""
+    """Recipe of a data set; None if there is none, or it is of another version."""
     try:
         return recorded_recipe(head.scene, head.recipe, head.overrides) if head.recipe else None
     except RecipeError:
@@ -467,13 +467,14 @@ class Sides:
     Attributes
     ----------
     name, text : str
-        Of the split.
+        Name and description of the split.
     train, test : numpy.ndarray [shape=(n_train,)], [shape=(n_test,)]
-        Rows, rising; each side has one or more.
+        Rows, rising; each side has at least one.
     machines_apart : bool
-        False where a machine is on both sides by design.
+        False if machines are on both sides by design.
     sha256 : str
-        Of the sides and the signals' checksums: of one hash, the same records train and test.
+        Hash of the sides and the signals' checksums: equal hashes mean equal train and test
+        records.
     """
 
     name: str
@@ -485,13 +486,13 @@ class Sides:
 
 
 def usable_sides(data: DataSet, name: str) -> Sides:
-    """A split that a file holds, of its usable records.
+    """Usable records of a stored split.
 
     Parameters
     ----------
     data : DataSet
     name : str
-        Of the split.
+        Name of the split.
 
     Returns
     -------
@@ -500,7 +501,7 @@ def usable_sides(data: DataSet, name: str) -> Sides:
     Raises
     ------
     DataError
-        There is no such split, a machine is on both sides against its intention, or a side has no
+        If there is no such split, a machine is on both sides unintentionally, or a side has no
         usable record.
     """
     train, test = data.split(name)
@@ -528,24 +529,24 @@ def usable_sides(data: DataSet, name: str) -> Sides:
 
 
 def store_splits(path: str | Path, splits: Sequence[Split], *, force: bool = False) -> None:
-    """Add splits to a finished file; signal and manifest stay as they are.
+    """Add splits to a finished file; signal and manifest are not changed.
 
-    The file is copied and the copy renamed, so that it is whole whenever this ends. One run at a
-    time does so: the other's splits would be lost.
+    The file is copied and the copy renamed, so that it is complete at any time. Only one run at a
+    time may do so, since the other's splits would be lost.
 
     Parameters
     ----------
     path : str or Path
         Data set.
     splits : sequence of Split
-        Of its records.
+        Splits of its records.
     force : bool
         Replace splits of the same name.
 
     Raises
     ------
     DataError
-        The file cannot be read, has splits of these names, another run writes it, or its folder
+        If the file cannot be read, has splits of these names, another run writes it, or its folder
         has no room.
     """
     place = Path(path).absolute()

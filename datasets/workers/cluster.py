@@ -30,10 +30,10 @@ WORKER_WAIT = 60.0
 """Time for a cluster without workers to get one [s]."""
 
 LOOK = 2.0
-"""Time between two looks at a cluster while its oldest result is awaited [s]."""
+"""Time between two checks of a cluster while its oldest result is awaited [s]."""
 
 RETRIES = 2
-"""Times that an item is done again where it raised, which another worker may not."""
+"""Number of retries of an item that raised, since another worker may succeed."""
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 
@@ -42,7 +42,7 @@ _ADDRESS = re.compile(
 )
 
 _ALONE = threading.Lock()
-"""Held while an item is done: the limit on threads is one for the whole process."""
+"""Held while an item is processed: the limit on threads applies to the whole process."""
 
 
 @contextmanager
@@ -52,35 +52,35 @@ def cluster_pool(
     say: Callable[[str], None],
     watch: Callable[[], None],
 ) -> Iterator[Pool]:
-    """Workers of a Dask cluster that is running, to be used by :func:`.workers.local.in_order`.
+    """Workers of a running Dask cluster, for use by :func:`.workers.local.in_order`.
 
-    Every worker must have the same wearstate and the same libraries as this process; one that
-    joins later and has not, fails its first item. The scheduler needs Dask only. Items that a lost
-    worker had in hand are given to another by the scheduler.
+    Every worker must have the same wearstate and the same libraries as this process; one that joins
+    later with others fails its first item. The scheduler needs Dask only. It reassigns the items of
+    a lost worker.
 
     Parameters
     ----------
     function : callable
         Importable by name, or a partial of such a function.
     scheduler : str
-        Its address, ``tcp://HOST:PORT``; ``tls://`` with the certificates of Dask's own settings.
+        Its address, ``tcp://HOST:PORT``; ``tls://`` with the certificates of Dask's settings.
     say : callable
-        Called with a line about what is waited for.
+        Called with a line about what is being waited for.
     watch : callable
-        Called every `LOOK` seconds while a result is waited for; may raise to stop.
+        Called every `LOOK` seconds while a result is awaited; may raise to stop.
 
     Yields
     ------
     Pool
-        Takes items and gives results.
+        Pool that takes items and returns results.
 
     Raises
     ------
     DataError
-        Dask is not installed, the address is none, the scheduler does not answer within `CONNECT`,
-        there is no worker within `WORKER_WAIT`, or workers have another wearstate.
+        If Dask is not installed, the address is invalid, the scheduler does not answer within
+        `CONNECT`, there is no worker within `WORKER_WAIT`, or workers have another wearstate.
     WorkersError
-        The scheduler or all workers were lost, or an item killed its workers.
+        If the scheduler or all workers were lost, or an item killed its workers.
     """
     refuse_scheduler(scheduler)
     with _quiet():
@@ -96,7 +96,7 @@ def cluster_pool(
 
 
 class _Cluster:
-    """Items sent to a scheduler, and those of its results that were not yet fetched."""
+    """Items sent to a scheduler, and results not yet fetched."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class _Cluster:
 
     @property
     def most(self) -> int:
-        """Follows the workers that come and go."""
+        """Largest number of items in flight; it follows the number of workers."""
         if time.monotonic() - self._looked > LOOK:
             self._most = AHEAD_PER_JOB * max(1, sum(self._client.nthreads().values()))
             self._looked = time.monotonic()
@@ -126,7 +126,7 @@ class _Cluster:
     def submit(self, item: Any) -> None:
         from cloudpickle import dumps
 
-        # packed: the scheduler opens what it passes on, and need not have wearstate
+        # packed, because the scheduler opens what it passes on, and need not have wearstate
         packed = dumps((self._function, item))
         future = self._client.submit(self._unpacked, packed, pure=False, retries=RETRIES)
         self._ahead.append(future)
@@ -138,7 +138,7 @@ class _Cluster:
         return self._ahead.popleft().result()
 
     def _awaited(self, future: Any) -> BaseException | None:
-        """What the oldest item raised, once it is done; None for a result or a lost scheduler."""
+        """Error of the oldest item, once it is done; None for a result or a lost scheduler."""
         idle = time.monotonic()
         while True:
             try:
@@ -159,17 +159,17 @@ class _Cluster:
 
 
 def refuse_scheduler(scheduler: str) -> None:
-    """Refuse an address where no Dask scheduler answers.
+    """Refuse an address at which no Dask scheduler answers.
 
     Parameters
     ----------
     scheduler : str
-        ``tcp://HOST:PORT``
+        Address, ``tcp://HOST:PORT``.
 
     Raises
     ------
     DataError
-        Dask is not installed, the address is none, or nothing answers within `CONNECT`.
+        If Dask is not installed, the address is invalid, or nothing answers within `CONNECT`.
     """
     if not _ADDRESS.fullmatch(scheduler):
         raise DataError(
@@ -183,7 +183,7 @@ def refuse_scheduler(scheduler: str) -> None:
             "scheduler needs Dask, which is not installed; pip install 'wearstate[dask]'"
         ) from error
     with _answering(scheduler), concurrent.futures.ThreadPoolExecutor(1) as thread:
-        # in a thread: the caller may have an event loop of its own
+        # in a thread: the caller may have its own event loop
         thread.submit(lambda: asyncio.run(_greeted(scheduler))).result()
 
 
@@ -191,10 +191,10 @@ def refuse_scheduler(scheduler: str) -> None:
 def _answering(scheduler: str) -> Iterator[None]:
     try:
         yield
-    except Exception as error:  # whatever a program that is no scheduler makes of it
+    except Exception as error:  # any error caused by a program that is not a scheduler
         raise DataError(
             f"scheduler = {scheduler} does not answer within {CONNECT:g} s "
-            f"({first_line(error)}); start it with 'dask scheduler', or mend address and network"
+            f"({first_line(error)}); start it with 'dask scheduler', or correct address or network"
         ) from error
 
 
@@ -206,7 +206,7 @@ def _connected(scheduler: str) -> Any:
 
 
 async def _greeted(scheduler: str) -> None:
-    """Connect once: Dask's client waits for ever for a program that listens and says nothing."""
+    """Connect once: Dask's client waits for ever for a listening program that does not answer."""
     from distributed.comm import connect
     from distributed.security import Security
 
@@ -233,10 +233,10 @@ def _await_worker(client: Any, scheduler: str, say: Callable[[str], None]) -> No
 
 
 def _check_workers(client: Any, say: Callable[[str], None]) -> None:
-    """Refuse workers whose records would not be the same; all faults at once."""
+    """Refuse workers whose records would differ; all faults at once."""
     ours = _fingerprint()
     answers = client.run(_asked(__name__), on_error="return")
-    # one that was lost meanwhile is the scheduler's business, like any other
+    # a worker lost meanwhile is handled by the scheduler, like any other
     theirs = {key: found for key, found in answers.items() if not isinstance(found, OSError)}
     faults = [
         f"worker {address}: {fault}"
@@ -248,11 +248,11 @@ def _check_workers(client: Any, say: Callable[[str], None]) -> None:
     _warn_of_processors(theirs, say)
     threads = client.nthreads()
     if most := max(threads.values(), default=1) - 1:
-        say(f"a worker has {most + 1} threads, of which one works; better: --nthreads 1")
+        say(f"a worker has {most + 1} threads, of which one is used; better: --nthreads 1")
 
 
 def _unpacker() -> Callable[[bytes], Any]:
-    """A function that is sent as code, for the sake of the scheduler."""
+    """Function that is sent as code, because the scheduler may lack wearstate."""
 
     def do(packed: bytes) -> Any:
         from cloudpickle import loads
@@ -264,7 +264,7 @@ def _unpacker() -> Callable[[bytes], Any]:
 
 
 def _asked(module: str) -> Callable[[], Any]:
-    """A function that is sent as code, so that a worker without wearstate can answer."""
+    """Function that is sent as code, so that a worker without wearstate can answer."""
 
     def ask() -> Any:
         try:
@@ -278,7 +278,7 @@ def _asked(module: str) -> Callable[[], Any]:
 
 
 def description() -> dict[str, str]:
-    """What decides the bits of a record: programs with their versions, and the processor.
+    """Properties that determine the bits of a record: programs with versions, and the processor.
 
     Examples
     --------
@@ -302,7 +302,7 @@ def _programs() -> Mapping[str, str]:
 
 
 def _sources() -> str:
-    """Hash of the sources that a record is made by; versions alone do not tell checkouts apart."""
+    """Hash of the sources that make a record; versions alone do not distinguish checkouts."""
     root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in sorted([*root.glob("sim/**/*.py"), *root.glob("datasets/**/*.py")]):
@@ -316,7 +316,7 @@ def _fingerprint() -> tuple[tuple[str, str], ...]:
 
 
 def _differences(ours: tuple[tuple[str, str], ...], found: Any) -> list[str]:
-    """Faults of one worker, from what it answered."""
+    """Faults of one worker, from its answer."""
     if isinstance(found, BaseException):
         return [f"cannot say what it runs ({first_line(found)}); restart it"]
     if "missing" in found:
@@ -338,13 +338,13 @@ def _warn_of_processors(theirs: Mapping[str, Any], say: Callable[[str], None]) -
 
 
 class _OtherProgramError(RuntimeError):
-    """Raised on a worker that came later and has another wearstate."""
+    """Raised on a worker that joined later and has another wearstate."""
 
 
 def _done_alone(
     function: Callable[[Any], Any], expected: tuple[tuple[str, str], ...], item: Any
 ) -> Any:
-    """Do one item, on a worker; one at a time, whatever threads the worker has."""
+    """Process one item on a worker; one at a time, however many threads the worker has."""
     if faults := _differences(expected, _programs()):
         raise _OtherProgramError("; ".join(faults))
     with _ALONE, threadpool_limits(1):
@@ -352,7 +352,7 @@ def _done_alone(
 
 
 def _fault(error: BaseException, scheduler: str) -> BaseException:
-    """What an item raised, as the caller should see it."""
+    """Error of an item in the form for the caller."""
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):
@@ -373,23 +373,23 @@ def _lost(scheduler: str) -> WorkersError:
 
 
 def _gone() -> tuple[type[BaseException], ...]:
-    """What Dask raises when the scheduler is gone."""
+    """Errors raised by Dask when the scheduler is lost."""
     from distributed.comm import CommClosedError
 
     return concurrent.futures.CancelledError, asyncio.CancelledError, CommClosedError
 
 
 def _close(client: Any) -> None:
-    """Leave the cluster; what it still had in hand is dropped with the client."""
+    """Disconnect from the cluster; outstanding items are dropped with the client."""
     try:
         client.close(timeout=LOOK)
-    except Exception as error:  # a scheduler that is gone cannot be left
+    except Exception as error:  # disconnecting fails if the scheduler is lost
         logging.getLogger(__name__).debug("leaving the cluster: %s", error)
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Dask's own log of a lost connection from the terminal; ours says it in one line."""
+    """Keep Dask's own log of a lost connection off the terminal; the error says it in one line."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

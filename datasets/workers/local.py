@@ -21,28 +21,28 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 JOBS_PER_CORE = 4
-"""More processes than this for every core only wait for each other."""
+"""Largest number of processes per core; more would only wait for each other."""
 
 ATTEMPTS = 3
-"""Times that processes may die before the oldest result in flight comes."""
+"""Number of times that processes may die before the oldest outstanding result arrives."""
 
 PARENT_CHECK = 1.0
-"""Time between two looks of a worker at whether its parent lives [s]."""
+"""Time between two checks of a worker whether its parent is alive [s]."""
 
 IDLE = 600.0
-"""Time after which an idle worker ends [s]: long, since a new one imports for seconds."""
+"""Time after which an idle worker ends [s]: long, since a new one takes seconds to import."""
 
-UNHEARD = 5.0
-"""Time after which a result that has not come is looked for among processes that died [s]."""
+OVERDUE = 5.0
+"""Time after which an outstanding result is checked against processes that died [s]."""
 
 WATCH = 1.0
-"""Time between two looks, while waiting, at whether the run still makes sense [s]."""
+"""Time between two calls of `watch` while waiting [s]."""
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 _SAFE_PATH = "PYTHONSAFEPATH"
-"""Environment variable that keeps the current folder off the path of a starting Python: a file
-there may be named like a module."""
+"""Environment variable that keeps the current folder off the path of a starting Python: a file in
+it may be named like a module."""
 
 
 def in_order(
@@ -54,37 +54,36 @@ def in_order(
     say: Callable[[str], None] | None = None,
     watch: Callable[[], None] | None = None,
 ) -> Generator[Result, None, None]:
-    """Apply a function in worker processes and give the results in order.
+    """Apply a function in worker processes and return the results in order.
 
     Parameters
     ----------
     function : callable
-        Importable by name, or a partial of such a function. An item is done again where its
-        worker died, so it should do nothing but return.
+        Importable by name, or a partial of such a function. An item is repeated if its worker died,
+        so that the function should have no side effects.
     items : iterable
-        Drawn from only as far as the workers need.
+        Read only as far as the workers need.
     jobs : int
-        Processes; 1 works in this one, without any other. No more are started than
-        `JOBS_PER_CORE` for every core.
+        Number of processes; 1 works in this process. At most `JOBS_PER_CORE` per core are started.
     scheduler : str, optional
-        Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers are used instead; `jobs`
-        is of no account then.
+        Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers are used instead; `jobs` is
+        then ignored.
     say : callable, optional
-        Called with a line about workers that are waited for, lost or too many.
+        Called with a line about workers that are awaited, lost or too many.
     watch : callable, optional
-        Called every `WATCH` seconds while a result of a worker is waited for; may raise to stop.
+        Called every `WATCH` seconds while a worker's result is awaited; may raise to stop.
 
     Yields
     ------
     result
-        Of each item, in the order of the items. The same for any `jobs` and `scheduler`.
+        Result of each item, in the order of the items. The same for any `jobs` and `scheduler`.
 
     Raises
     ------
     WorkersError
-        Worker processes died `ATTEMPTS` times in a row, or the cluster was lost.
+        If worker processes died `ATTEMPTS` times in a row, or the cluster was lost.
     DataError
-        The cluster cannot be used; see :func:`wearstate.datasets.workers.cluster.cluster_pool`.
+        If the cluster cannot be used; see :func:`wearstate.datasets.workers.cluster.cluster_pool`.
 
     Examples
     --------
@@ -102,11 +101,11 @@ def in_order(
 
 
 def _silent(_: str) -> None:
-    """Say nothing."""
+    """Ignore the message."""
 
 
 def _nothing() -> None:
-    """Look at nothing."""
+    """Do nothing."""
 
 
 def _bounded(jobs: int, say: Callable[[str], None]) -> int:
@@ -158,7 +157,7 @@ def _processes(
 
 @contextmanager
 def _safe_path() -> Iterator[None]:
-    """Also for the processes that loky starts beside its workers, which take no environment."""
+    """Set the variable for the processes that loky starts in addition to its workers."""
     if os.environ.get(_SAFE_PATH):
         yield
         return
@@ -170,7 +169,7 @@ def _safe_path() -> Iterator[None]:
 
 
 class _Processes:
-    """Processes of this machine, started anew where one dies."""
+    """Processes of this machine, replaced when one dies."""
 
     def __init__(
         self,
@@ -187,9 +186,9 @@ class _Processes:
     def _start(self) -> None:
         from joblib.externals.loky import get_reusable_executor
 
-        # loky renews a worker that was idle for long, or grew by 300 MB (as one does that compiles
-        # kernels), and warns of it in the thread that hands out work: where warnings are errors
-        # that thread ends, and every later result is waited for without end
+        # loky renews a worker that was idle for long, or grew by 300 MB (as when compiling
+        # kernels), and warns of it in the thread that submits work: if warnings are errors, that
+        # thread ends, and every later result is awaited for ever
         warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         self._executor = get_reusable_executor(
             max_workers=self._jobs,
@@ -213,7 +212,7 @@ class _Processes:
     def _sent(self, item: Any) -> "Future[Any]":
         try:
             future: Future[Any] = self._executor.submit(self._function, item)
-        except BrokenExecutor as error:  # seen when it is taken, where attempts are counted
+        except BrokenExecutor as error:  # reported by take, where attempts are counted
             future = Future()
             future.set_exception(error)
         return future
@@ -228,7 +227,7 @@ class _Processes:
                 self._ahead.popleft()
                 return result
             if attempt < ATTEMPTS:
-                self._say("a worker process died; what it had in hand is done again")
+                self._say("a worker process died; its items are repeated")
                 self._renew()
         raise WorkersError(
             f"worker processes died {ATTEMPTS} times over the same work, must be < {ATTEMPTS} "
@@ -236,29 +235,29 @@ class _Processes:
         ) from fault
 
     def _come(self, future: "Future[Any]") -> Any:
-        """Result of a future, also where a process died with half of its result sent."""
-        unheard = time.monotonic() + UNHEARD
+        """Result of a future, even if a process died with half of its result sent."""
+        overdue = time.monotonic() + OVERDUE
         while True:
             wait([future], WATCH)
             if future.done():
                 return future.result()
             self._watch()
-            if time.monotonic() < unheard:
+            if time.monotonic() < overdue:
                 continue
-            unheard = time.monotonic() + UNHEARD
+            overdue = time.monotonic() + OVERDUE
             if any(process.exitcode for process in self._workers()):
                 self._end()
 
     def _renew(self) -> None:
-        self._start()  # loky gives a new executor for a broken one
+        self._start()  # loky returns a new executor for a broken one
         self._ahead = deque(
             (item, future if _has_come(future) else self._sent(item))
             for item, future in self._ahead
         )
 
     def kill(self) -> None:
-        # loky's own way, kill_workers, fails in its thread over an item submitted just before;
-        # processes that die are what it is made for
+        # loky's own kill_workers fails in its thread if an item was submitted just before; it
+        # handles processes that die
         self._end()
         self._executor.shutdown(wait=True)
 
@@ -267,7 +266,7 @@ class _Processes:
         results = self._executor._result_queue
         for process in self._workers():
             process.terminate()
-        if results is not None:  # this process holds an end to write at: without it, no end of file
+        if results is not None:  # this process holds a write end, which delays the end of file
             results._writer.close()
 
     def _workers(self) -> list[Any]:
@@ -293,17 +292,17 @@ def cores() -> int:
 
 def _settle(parent: int) -> None:
     """Start a worker."""
-    # Ctrl-C reaches every process of the terminal; the one that writes ends the others
+    # Ctrl-C reaches all processes of the terminal; the writing one ends the others
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # the parent has said what is wrong with the kernel cache
+    # the parent has already reported faults of the kernel cache
     logging.getLogger(f"{__name__.partition('.')[0]}.sim.jit").setLevel(logging.ERROR)
-    # loky collects garbage once a second; over every imported object that is 8 % of a run
+    # loky collects garbage once a second; over all imported objects that is 8 % of a run
     gc.freeze()
     threading.Thread(target=_follow, args=(parent,), daemon=True).start()
 
 
 def _follow(parent: int) -> None:
-    """End this worker when the process that started it is gone: a killed one cannot say so."""
+    """End this worker when its parent process is gone, since a killed parent cannot do so."""
     while os.getppid() == parent:
         time.sleep(PARENT_CHECK)
     os._exit(1)

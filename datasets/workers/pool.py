@@ -1,35 +1,35 @@
-"""What gives work out and takes it back: here or on a cluster, the same."""
+"""Common interface of worker pools, local or on a cluster."""
 
 from typing import Any, Protocol
 
 AHEAD_PER_JOB = 2
-"""Items handed out and not yet taken back, per worker; bounds the memory of a run."""
+"""Items submitted and not yet taken, per worker; bounds the memory of a run."""
 
 
 class WorkersError(RuntimeError):
-    """Workers were lost; names which, why, and the cure. The input is not at fault."""
+    """Workers were lost; names which, why, and the cure. The input is not the cause."""
 
 
 class Pool(Protocol):
-    """Takes work and gives results back, oldest first."""
+    """Takes items and returns results, oldest first."""
 
     def submit(self, item: Any) -> None:
-        """Hand out one more item."""
+        """Submit one more item."""
 
     def take(self) -> Any:
-        """Wait for the oldest result; raises what the function raised, or WorkersError."""
+        """Wait for the oldest result; raises the error of the function, or WorkersError."""
 
     @property
     def waiting(self) -> int:
-        """Items handed out and not taken back."""
+        """Number of items submitted and not taken."""
 
     @property
     def most(self) -> int:
-        """Items to hand out at most."""
+        """Largest number of items to submit ahead."""
 
 
 def first_line(error: BaseException) -> str:
-    r"""First line of what an error says, or its name.
+    r"""First line of an error's message, or the name of its type.
 
     Examples
     --------

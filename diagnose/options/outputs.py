@@ -13,11 +13,11 @@ SCENE_SUFFIXES = (".toml",)
 CHART_SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
 PICTURE_SUFFIXES, TABLE_SUFFIXES = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
 _Output = tuple[Path | None, tuple[str, ...]]
-"""A file to write, None where it was not asked for, and the suffixes it may have."""
+"""A file to write (None if not requested), and the suffixes it may have."""
 
 
 def check_interactive(interactive: bool, output: Path | None) -> None:
-    """Refuse points to tap where there is no page, or nothing to draw them."""
+    """Refuse tappable points without a page, or without the library that draws them."""
     if not interactive:
         return
     if output is None or output.suffix not in PAGE_SUFFIXES:
@@ -33,8 +33,8 @@ def check_outputs(inputs: Sequence[Path | str], outputs: Sequence[_Output], forc
     Raises
     ------
     DataError
-        An output has the wrong suffix, is a folder or in none, exists and `force` is not given,
-        or is the same file as an input or another output: that one `force` does not override.
+        If an output has the wrong suffix, is a folder or in none, exists and `force` is not given,
+        or is the same file as an input or another output, which `force` does not override.
     """
     from ...sim.output.recording import DataError
 
@@ -67,17 +67,17 @@ def _name_faults(path: Path, suffixes: tuple[str, ...]) -> list[str]:
     if path.suffix not in suffixes:
         return [f"{path}: suffix {path.suffix!r} must be one of {', '.join(suffixes)}; rename it"]
     if not path.parent.is_dir():
-        return [f"{path.parent} is no folder; create it"]
+        return [f"{path.parent} is not a folder; create it"]
     return _unwritable(path.parent)
 
 
 def refuse_unwritable(output: Path) -> None:
-    """Refuse an output where nothing can be written, before any work.
+    """Refuse an output in a place that cannot be written, before any work.
 
     Raises
     ------
     DataError
-        Names the folder and why.
+        If it cannot; names the folder and the reason.
     """
     from ...sim.output.recording import DataError
 
@@ -87,7 +87,7 @@ def refuse_unwritable(output: Path) -> None:
 
 
 def _unwritable(folder: Path) -> list[str]:
-    """Tried, as rights alone do not tell: a disk may be full or mounted to be read only."""
+    """Reason why a folder cannot be written, by trial: a disk may be full or read-only."""
     from tempfile import TemporaryFile
 
     try:
