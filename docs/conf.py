@@ -23,7 +23,7 @@ extensions = [
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "examples", "**/GALLERY_HEADER.rst"]
-suppress_warnings = ["config.cache"]  # the example order is a function, which cannot be pickled
+suppress_warnings = ["config.cache"]  # the example order is a function and cannot be pickled
 
 # --- text
 
@@ -54,7 +54,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "show_memory": False,
     "show_signature": False,
-    "write_computation_times": False,  # its page loads scripts from elsewhere
+    "write_computation_times": False,  # its page would load external scripts
     "min_reported_time": 1,
     "remove_config_comments": True,
 }
@@ -78,7 +78,7 @@ html_show_sourcelink = False
 html_sidebars = {"index": [], "start": []}
 
 
-# --- names inside the package that have no page of their own
+# --- references to names without a page of their own
 
 
 @functools.cache
@@ -103,7 +103,7 @@ def _public() -> dict[int, str]:
 
 
 def _found(target: str, module: str | None) -> Any:
-    """What a docstring names: absolute, in its own module, or ``.film.direct``-like by its end."""
+    """Object that a docstring names in full, within its module or by its end (``.film.direct``)."""
     name = target.lstrip("~.")
     places = [name, *(f"{home}.{name}" for home in _homes(module))]
     places += [f"{each}.{name.rpartition('.')[2]}" for each in _modules() if _ends(each, name)]
@@ -123,7 +123,7 @@ def _found(target: str, module: str | None) -> Any:
 
 @functools.cache
 def _homes(module: str | None) -> list[str]:
-    """A public module, and the modules that define what it gives."""
+    """A public module and the modules that define its names."""
     if not module:
         return []
     given = importlib.import_module(module)
@@ -153,5 +153,5 @@ def _resolve(app: Any, env: Any, node: Any, contnode: Any) -> Any:
 
 
 def setup(app: Any) -> None:
-    """Let Sphinx ask for names that it does not know."""
+    """Resolve names that Sphinx does not know."""
     app.connect("missing-reference", _resolve)

@@ -1,9 +1,10 @@
 """Pictures of the page on fidelity: ``python docs/figures_fidelity.py [FOLDER]``, all simulated.
 
-Small ones of a few scenes, half a minute on one core: a chart is speed against accuracy of every
-rung and step (``wearstate chart``), a map shows where each method fails (``wearstate stability``).
-``--scenes NAME ...`` writes the whole ones of these scenes instead, in up to ten minutes each; the
-text of every chart goes to stdout. Atlases have no budget: they come out the same on every machine.
+Small charts and maps of a few scenes, half a minute on one core: a chart shows speed against
+accuracy of every rung and step (``wearstate chart``), a map where each method fails
+(``wearstate stability``). ``--scenes NAME ...`` writes the full charts and atlases of these scenes
+instead, in up to ten minutes each, and prints the text of every chart to stdout. Atlases have no
+time budget and are the same on every machine.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from wearstate.diagnose.stability.figure import atlas_figure, save_figure
 from wearstate.sim.scene.load import load_scene, scene_names
 
 BUDGET = 300.0
-"""Seconds of a chart; what it leaves no time for is said in the picture."""
+"""Time of a chart [s]; the picture names what was left out for lack of time."""
 
 JOBS = 2
 """Worker processes of a chart; its errors do not depend on them."""
@@ -34,7 +35,7 @@ SHORTER: dict[str, dict[str, Any]] = {
     "journal-unbalance": {"duration": "0.16 s", "settling_revolutions": 6},
     "journal-whirl": {"duration": "0.25 s", "start.x": 0.6},  # near its limit cycle
 }
-"""Scenes whose recording is cut, so that a budget of minutes sees all rungs."""
+"""Scenes with a shortened recording, so that all rungs fit into a budget of minutes."""
 
 COARSER: dict[str, dict[str, Any]] = {
     "slider-crank-benchmark": {"accuracy": 0.05},  # 0.02 takes 512 starts of every step
@@ -44,19 +45,19 @@ COARSER: dict[str, dict[str, Any]] = {
 
 
 def chart(name: str, budget: float | None = BUDGET, jobs: int = JOBS) -> Chart:
-    """Chart of a scene, with its rungs as written where they are pinned."""
+    """Chart of a scene, pinned rungs as written."""
     changes = SHORTER.get(name, {}) | COARSER.get(name, {})
     return scene_chart(load_scene(name, changes), budget=budget, jobs=jobs)
 
 
 def small_chart() -> Figure:
-    """Chart of a journal bearing over ten revolutions, every combination of it."""
+    """Chart of a journal bearing over ten revolutions, with every combination."""
     found = scene_chart(load_scene("journal-bearing", {"duration": "0.2 s"}), jobs=1)
-    return question_figure(found, found.questions[-1])  # other rungs allowed
+    return question_figure(found, found.questions[-1])  # with other rungs allowed
 
 
 def small_map(name: str, plan: str, size: int) -> Figure:
-    """One map of a scene, so many cells along either axis."""
+    """Map of a scene with `size` cells along either axis."""
     scene = load_scene(name)
     return atlas_figure(scene, atlas(scene, name=plan, size=size))
 
@@ -69,7 +70,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 
 
 def whole(names: Sequence[str], folder: Path) -> None:
-    """Write chart and atlas of scenes, and print what the charts say."""
+    """Write charts and atlases of scenes, and print the text of the charts."""
     for name in names:
         found = chart(name)
         save_chart(found, folder / f"chart-{name}.png")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from sheets import COLOURS, folder_asked, label, sheet, write
+from sheets import COLOURS, label, output_folder, sheet, write
 from wearstate.sim.bearing.equilibrium import equilibrium
 from wearstate.sim.film.impedance_map import impedance_map
 from wearstate.sim.film.map_look_up import map_force
@@ -42,7 +42,7 @@ def run(
 
 
 def clearance_circle(axes: Any) -> None:
-    """Unit circle, X downwards as the load points, Y to the right."""
+    """Unit circle, X downwards along the load, Y to the right."""
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
     axes.plot(circle.imag, circle.real, color="black", lw=1)
     axes.set_aspect("equal", adjustable="box")
@@ -112,7 +112,7 @@ def pressure_field() -> Figure:
 
 
 def threshold(speeds: tuple[float, ...] = (4400, 4800, 4900, 5200, 6000)) -> Figure:
-    """From a spot to half-frequency whirl as the speed passes the threshold."""
+    """From a fixed point to half-frequency whirl as the speed passes the threshold."""
     figure, axes = sheet(
         "journal-whirl (simulated): through the threshold of stability", 2, len(speeds), (15, 6.2)
     )
@@ -137,7 +137,7 @@ def threshold(speeds: tuple[float, ...] = (4400, 4800, 4900, 5200, 6000)) -> Fig
 
 
 def impedance() -> Figure:
-    """The film as a table over two numbers."""
+    """The film force as a table over two variables."""
     table = impedance_map(PAPER).table
     eccentricity = np.linspace(0.0, 0.95, 96)
     angle = np.radians(np.linspace(0, 360, 181))
@@ -167,7 +167,7 @@ def impedance() -> Figure:
 
 
 def _rates(eccentricity: float, angle: float) -> tuple[float, float]:
-    """Rates that make V of length one, at an angle from the line of centres, along X."""
+    """Rates for which V has length one, at an angle from the line of centres, which is along X."""
     return np.cos(angle), np.sin(angle) + eccentricity / 2  # V = (X' + Y/2, Y' - X/2)
 
 
@@ -193,7 +193,7 @@ def rungs() -> Figure:
 
 
 def scar() -> Figure:
-    """What a worn scar does to gap and pressure of a bearing that carries a steady load."""
+    """Effect of a worn scar on gap and pressure of a bearing under steady load."""
     load, n = 1 / (np.pi * 0.18), 144
     figure, axes = sheet(
         "Worn bore after Dufrane (simulated): L/D 1, Sommerfeld number 0.18, load at 0",
@@ -228,4 +228,4 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 
 
 if __name__ == "__main__":
-    write(FIGURES, folder_asked())
+    write(FIGURES, output_folder())

@@ -1,8 +1,8 @@
 """Figure of the page on lubrication: ``python docs/figures_oil.py [FOLDER]``, simulated.
 
-What oil in the crank pin does to the vibration of a bilge pump, by clearance, speed, viscosity and
-how much of the gap the oil fills. The figure draws the table of the page; ``--table`` computes and
-prints that, some minutes.
+Effect of oil in the crank pin on the vibration of a bilge pump, by clearance, speed, viscosity and
+filled gap. The figure is drawn from the table of the page; ``--table`` computes and prints that
+table in some minutes.
 """
 
 import re
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from sheets import folder_asked, write
+from sheets import output_folder, write
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 
@@ -39,7 +39,7 @@ COLOURS = ("#1f5a94", "#b3541e", "#d08a3e", "#4f7d3a", "#7fae6a")
 
 
 def run(clearance: float, speed: float, regime: str) -> tuple[float, float, float]:
-    """Vibration across the stroke, rms [m/s^2]; least film [m]; part of the time that peaks rub."""
+    """Rms vibration across the stroke [m/s^2], least film [m], share of asperity contact."""
     oil = REGIMES[regime]
     changes: dict[str, Any] = {
         "joint.crankpin.diametral_clearance": clearance,
@@ -62,7 +62,7 @@ def run(clearance: float, speed: float, regime: str) -> tuple[float, float, floa
 
 
 def table() -> dict[tuple[int, str], list[tuple[float, float, float]]]:
-    """Speed and regime -> a result for each clearance."""
+    """Speed and regime -> results for each clearance."""
     return {
         (speed, regime): [run(clearance, speed, regime) for clearance in CLEARANCES]
         for speed in SPEEDS
@@ -71,7 +71,7 @@ def table() -> dict[tuple[int, str], list[tuple[float, float, float]]]:
 
 
 def stated() -> dict[tuple[int, str], list[float]]:
-    """Speed and regime -> vibration at each clearance [m/s^2], as the page's table has it."""
+    """Speed and regime -> vibration at each clearance [m/s^2], from the page's table."""
     text = PAGE.read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\d+) \| ([^|]+) \| (.+) \| [^|]* \|$", text, re.MULTILINE)
     return {
@@ -99,7 +99,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {"pump-oil": picture}
 
 
 def print_table() -> None:
-    """Compute the table and print it as it stands on the page."""
+    """Compute the table and print it in the format of the page."""
     heads = " | ".join(f"{1e3 * clearance:g} mm" for clearance in CLEARANCES)
     print(f"| speed | oil | {heads} | least film |")
     print("|---" * (len(CLEARANCES) + 3) + "|")
@@ -114,4 +114,4 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--table"]:
         print_table()
     else:
-        write(FIGURES, folder_asked())
+        write(FIGURES, output_folder())

@@ -2,7 +2,7 @@
 
 The source paper's four figures (combined cylinder pressure, piston velocity with and without
 clearance, casing modes, transfer function), the pins in their clearance circles, a map of contact,
-flight and impact, what other faults look like, the triplex pump, and lives of crank pins.
+flight and impact, the signatures of other faults, the triplex pump, and lives of crank pins.
 """
 
 import sys
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from sheets import COLOURS, folder_asked, label, sheet, write
+from sheets import COLOURS, label, output_folder, sheet, write
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.records import sample_records
 from wearstate.sim.hydraulics.flow_ripple import even_phases, flow_ripple
@@ -36,7 +36,7 @@ def pump(overrides: dict[str, Any] | None = None, name: str = "bilge-pump") -> P
 
 
 def turn(scene: PumpScene, revolutions: float = 1.0) -> dict[str, NDArray[np.float64]]:
-    """The last revolutions of a run, from top dead centre: angle [deg] and everything by it."""
+    """Crank angle [deg] and signals of the last revolutions of a run, from top dead centre."""
     period = 1 / scene.drive.speed
     n = round(period / STEP * revolutions)
     before = SETTLING * round(period / STEP)
@@ -133,7 +133,7 @@ def velocity() -> Figure:
         second,
         "",
         "difference [mm/s]",
-        "What the clearance adds: the pin crosses, strikes, bounces",
+        "Effect of the clearance: the pin crosses, strikes, bounces",
     )
     label(third, "crank angle after top dead centre [deg]", "acceleration [m/s²]", "Acceleration")
     degrees(third)
@@ -141,7 +141,7 @@ def velocity() -> Figure:
 
 
 def modes() -> Figure:
-    """Casing modes at every place."""
+    """Casing mode shapes at every place."""
     scene = pump()
     figure, axes = sheet(
         "bilge-pump (simulated): casing modes, mass-normalised shapes", 2, 4, (12, 5.5), sharey=True
@@ -236,7 +236,7 @@ def contact_map(
 def flight_map(cells: int = 24) -> Figure:
     """Contact, flight and impact over a revolution against clearance and against speed."""
     figure, axes = sheet(
-        "bilge-pump (simulated): where the crank pin flies and lands, four revolutions each",
+        "bilge-pump (simulated): flight and landing of the crank pin, four revolutions each",
         2,
         2,
         (12, 7.5),
@@ -275,7 +275,7 @@ FAULTS = {
 
 
 def faults() -> Figure:
-    """Acceleration by crank angle for wear and for what must not be mistaken for it."""
+    """Acceleration by crank angle for wear and for faults that must not be mistaken for it."""
     figure, axes = sheet(
         "bilge-pump with valves (simulated): casing acceleration acc_x over a revolution",
         len(FAULTS),
@@ -320,7 +320,7 @@ def triplex() -> Figure:
         axes[0, 0],
         "",
         "pressure [MPa]",
-        "Chambers: compression takes part of the stroke",
+        "Chambers: compression takes a part of the stroke",
         "upper right",
     )
     label(axes[1, 0], "", "moment [N m]", "Drive moment at the crank", "upper right")
@@ -335,7 +335,7 @@ def triplex() -> Figure:
 
 
 def kinematic_flow(scene: PumpScene, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Delivery of all throws by kinematics alone, per piston area, crank radius and speed."""
+    """Kinematic flow of all throws, over piston area, crank radius and speed."""
     ratio = scene.crank.radius / scene.rod.length
     total = np.zeros_like(angle)
     for throw in scene.throws:
@@ -345,11 +345,11 @@ def kinematic_flow(scene: PumpScene, angle: NDArray[np.float64]) -> NDArray[np.f
     return total
 
 
-MACHINES = 6  # of the figure, and how many recordings each
+MACHINES = 6
 
 
 def life() -> Figure:
-    """Clearance against operating time, where the eye wears, and what remains."""
+    """Clearance and remaining life against operating time, place and power of the wear."""
     recipe = load_recipe("bilge-pump-life")
     each = recipe.table.records_per_group
     rows = [sample.row for sample in sample_records(recipe, MACHINES * each, seed=1)]
@@ -377,9 +377,7 @@ def life() -> Figure:
     label(scar, "angle [deg]", "depth over its mean", "Where they wear", "upper left")
     rate.plot(clearances, [wear.power for wear in found], "o-", color=COLOURS[2])
     rate.set_ylim(0, 1500)
-    label(
-        rate, "clearance [mm]", "force times sliding speed [W]", "How fast: hardly by clearance", ""
-    )
+    label(rate, "clearance [mm]", "force times sliding speed [W]", "Sliding power by clearance", "")
     return figure
 
 
@@ -397,4 +395,4 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 
 
 if __name__ == "__main__":
-    write(FIGURES, folder_asked())
+    write(FIGURES, output_folder())

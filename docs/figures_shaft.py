@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from scipy.signal import find_peaks
-from sheets import COLOURS, folder_asked, label, sheet, write
+from sheets import COLOURS, label, output_folder, sheet, write
 from wearstate.diagnose.machines.registry import presentation_of
 from wearstate.diagnose.shaft_tests.before_after import calibrated_test
 from wearstate.diagnose.shaft_tests.next_test import rank_tests, usual_responses
@@ -35,7 +35,7 @@ from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_l
 from wearstate.sim.shaft_response.receptance import accelerance
 
 MISALIGNED = {"bearings.2.offset": "-1.0 mm", "bearings.3.offset": "1.4 mm"}
-"""The line before calibration: chocks of the two intermediate bearings badly set."""
+"""The line before calibration: chocks of the two intermediate bearings misaligned."""
 
 
 @cache
@@ -156,7 +156,7 @@ def _weight(model: ShaftScene, section: Any) -> float:
 
 
 def influence_lines() -> Figure:
-    """What raising each bearing does to the line and to all reactions."""
+    """Effect of raising each bearing on the line and on all reactions."""
     line = alignment_line(straight())
     names = [words(bearing.name) for bearing in straight().bearings]
     figure, axes = sheet(
@@ -194,7 +194,7 @@ def _raised(line: AlignmentLine, i: int) -> AlignmentLine:
 
 
 def films() -> Figure:
-    """Pressure on every bearing's unrolled bore, badly set and calibrated."""
+    """Pressure on every bearing's unrolled bore, misaligned and calibrated."""
     cases = states()
     count = len(cases["before"].film.bearings)
     figure, axes = sheet(
@@ -256,7 +256,7 @@ def transfer() -> Figure:
                 each.plot(hertz, level, lw=1.1, color=colour, label=name)
     for row, bearing in zip(axes, names, strict=True):
         last = "frequency [Hz]" if bearing == names[-1] else ""
-        label(row[0], last, "dB re 1 µm/s²/N", f"{words(bearing)}: films as they are")
+        label(row[0], last, "dB re 1 µm/s²/N", f"{words(bearing)}: complete films")
         label(row[1], last, "", f"{words(bearing)}: films as springs without damping")
         for each in row:
             each.get_legend().remove()
@@ -265,7 +265,7 @@ def transfer() -> Figure:
 
 
 def springs_alone(rotor: Rotor) -> Rotor:
-    """The films' stiffness between upright forces and motions only, as the source paper has it."""
+    """The films' stiffness between vertical forces and motions only, as in the source paper."""
     bare = np.zeros((4, 4))
     upright = bare.copy()
     upright[0, 0] = 1.0
@@ -278,7 +278,7 @@ def springs_alone(rotor: Rotor) -> Rotor:
 
 
 def campbell_diagram() -> Figure:
-    """Damped frequencies and damping over the speed, films solved anew at each."""
+    """Damped frequencies and damping over the speed, with the films solved at each speed."""
     speeds = np.linspace(60, 480, 29) / 60
 
     def rotor(speed: float) -> Any:
@@ -318,7 +318,7 @@ def campbell_diagram() -> Figure:
 
 
 def rig() -> Figure:
-    """A simulated shaker test of the laboratory rig, its third bearing 0.2 mm lower still."""
+    """A simulated shaker test of the laboratory rig, its third bearing another 0.2 mm lower."""
     bench = load_scene("shaft-rig", {"bearings.2.sag": "0.2 mm"})
     assert isinstance(bench, ShaftScene)
     found = calibrate(alignment_line(bench), tuple(alignment_conditions(bench).values()))
@@ -334,10 +334,10 @@ ALIGNED = {
     "shaft-rig": ({"bearings.2.offset": "0 mm"}, "third", 300.0, ("aft", "forward")),
     "propulsion-shaft": ({}, "intermediate_aft", 200.0, ("stern_aft", "thrust_block")),
 }
-"""Scene -> what makes it straight, the bearing that sags, the band [Hz], where it is pushed."""
+"""Scene -> overrides that make it straight, sagging bearing, upper frequency [Hz], force places."""
 
 SAGS = {"shaft-rig": (0.1, 0.2, 0.3, 0.4, 0.5), "propulsion-shaft": (0.3, 0.6, 1.2, 1.8, 2.4)}
-"""mm; the last two of each leave the bearing without load, or press it up."""
+"""Sags [mm]; the last two of each leave the bearing without load or with an upward load."""
 
 SPEED_SHARES = (0.7, 1.0, 1.3)
 AUDIBLE_DB = 1.0
@@ -345,9 +345,9 @@ AUDIBLE_DB = 1.0
 
 @cache
 def aligned_peaks(name: str, push: str, axis: str) -> tuple[tuple[int, int, float], ...]:
-    """How many peaks of the sagged line fall and rise by alignment, and by how much they fall most.
+    """Numbers of peaks of the sagged line that fall and rise by alignment, largest fall [dB].
 
-    In rows of the speeds, the sags of each following each other.
+    Ordered by speed, then by sag.
     """
     overrides, bearing, high, _ = ALIGNED[name]
     bench = load_scene(name, overrides)
@@ -379,7 +379,7 @@ def _decibels(value: Any) -> Any:
 
 
 def _peak_changes(before: Any, after: Any) -> list[float]:
-    """Change of each peak of 3 dB to the highest one within a tenth of the 240 lines beside it."""
+    """Change of each peak of at least 3 dB to the highest one within a tenth of its frequency."""
     tops, _ = find_peaks(before, prominence=3.0)
     others, _ = find_peaks(after, prominence=1.0)
     changes = []
@@ -391,7 +391,7 @@ def _peak_changes(before: Any, after: Any) -> list[float]:
 
 
 def contradiction() -> Figure:
-    """Where alignment makes peaks fall: sag, speed, place and direction of the push."""
+    """Where alignment lowers peaks: by sag, speed, place and direction of the force."""
     figure, panels = sheet("Peaks that alignment lowers (↓) and raises (↑) by a decibel", 2, 4,
                            (13, 6.2))  # fmt: skip
     for row, (name, (_, bearing, _, pushes)) in zip(panels, ALIGNED.items(), strict=True):
@@ -417,15 +417,15 @@ def contradiction() -> Figure:
 
 
 BURSTS = (3, 10, 30, 100, 300)
-TOLD = 2 * 1.645
-"""Deviations of a sag that is told at 5 % false alarms in 95 % of the tests."""
+DETECTABLE = 2 * 1.645
+"""Standard deviations of a sag that 95 % of the tests detect at 5 % false alarms."""
 
 
 @cache
-def told_sags(push: str, axis: str, sensors: int, film: float) -> tuple[float, ...]:
-    """Smallest sag of the rig's third bearing that is told, by the bursts of a shaker test [mm].
+def detectable_sags(push: str, axis: str, sensors: int, film: float) -> tuple[float, ...]:
+    """Smallest detectable sag of the rig's third bearing for each number of bursts [mm].
 
-    Sensors are those of the third bearing alone, or of all; `film` is the films' error.
+    One sensor is that of the third bearing, more are those of all; `film` is the films' error.
     """
     bench = load_scene("shaft-rig", {"bearings.2.offset": "0 mm"})
     assert isinstance(bench, ShaftScene)
@@ -439,28 +439,28 @@ def told_sags(push: str, axis: str, sensors: int, film: float) -> tuple[float, .
             places=[(push, axis)],
             responses=places,
         )
-        found.append(1e3 * TOLD * test.deviations[1])
+        found.append(1e3 * DETECTABLE * test.deviations[1])
     return tuple(found)
 
 
 def detectability() -> Figure:
-    """Smallest sag that a shaker test of the rig tells, over its length."""
-    figure, panels = sheet("Smallest sag of the rig's third bearing that is told", 1, 2, (10, 3.8))
+    """Smallest sag that a shaker test of the rig detects, over its length."""
+    figure, panels = sheet("Smallest detectable sag of the rig's third bearing", 1, 2, (10, 3.8))
     cases = [("third", "y"), ("forward", "y"), ("aft", "y"), ("aft", "z")]
     for axes, sensors, title in zip(
         np.ravel(panels), (4, 1), ("four accelerometers", "one, on the third bearing"), strict=True
     ):
         for (push, axis), colour in zip(cases, COLOURS, strict=False):
             name = f"push {push} {'up' if axis == 'y' else 'sideways'}"
-            axes.loglog(BURSTS, told_sags(push, axis, sensors, 0.03), "o-", color=colour,
-                        label=name)  # fmt: skip
-            axes.loglog(BURSTS, told_sags(push, axis, sensors, 0.01), "--", color=colour, lw=0.8)
+            sags = {film: detectable_sags(push, axis, sensors, film) for film in (0.03, 0.01)}
+            axes.loglog(BURSTS, sags[0.03], "o-", color=colour, label=name)
+            axes.loglog(BURSTS, sags[0.01], "--", color=colour, lw=0.8)
         label(axes, "bursts of 4 s", "sag [mm]", title)
     return figure
 
 
 def recording() -> Figure:
-    """What the sensors of a line with a worn stern bearing record, and what they do not see."""
+    """Recording of a line with a worn stern bearing, and quantities that no sensor measures."""
     worn = load_scene("propulsion-shaft", {"bearings.0.wear_down": "0.9 mm"})
     figure = Figure(figsize=(11, 7), layout="constrained")
     figure.suptitle(f"{worn.name} (simulated)")
@@ -482,4 +482,4 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 
 
 if __name__ == "__main__":
-    write(FIGURES, folder_asked())
+    write(FIGURES, output_folder())

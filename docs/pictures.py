@@ -1,7 +1,7 @@
-"""Pictures of the pages, made where one is missing or the program has changed since.
+"""Make the pictures of the pages that are missing or older than the program.
 
-``python docs/pictures.py [JOBS]``, which ``make docs`` calls; one to two minutes on two cores, with
-the screenshots of pages (``screenshots.py``) beside them.
+``python docs/pictures.py [JOBS]``, which ``make docs`` calls, also makes the screenshots of pages
+(``screenshots.py``); one to two minutes on two cores.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ FLOORS = ("sim", "features", "datasets", "diagnose")
 
 
 def state(sources: Iterable[Path]) -> str:
-    """Hash of all that decides the pictures."""
+    """Hash of all files that the pictures depend on."""
     digest = hashlib.sha256()
     for path in sorted(sources):
         digest.update(str(path.relative_to(DOCS.parent)).encode() + b"\0")
@@ -29,7 +29,7 @@ def state(sources: Iterable[Path]) -> str:
 
 
 def current(script: str) -> str:
-    """State of the program and of a script."""
+    """Hash of the program and of a script."""
     sources = [DOCS / script, DOCS / "sheets.py"]
     for floor in FLOORS:
         for kind in ("*.py", "*.toml"):
@@ -38,7 +38,7 @@ def current(script: str) -> str:
 
 
 def stale(script: str) -> bool:
-    """Whether a script must run."""
+    """Whether a script must run again."""
     stamp = FOLDER / f".{script}.made"
     if not stamp.is_file() or stamp.read_text().split("\n")[0] != current(script):
         return True
@@ -46,7 +46,7 @@ def stale(script: str) -> bool:
 
 
 def run(script: str) -> None:
-    """Make the pictures of a script, and note for which state."""
+    """Make the pictures of a script, and store the hash they were made for."""
     known = current(script)
     command = [sys.executable, str(DOCS / script), str(FOLDER)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
@@ -55,7 +55,7 @@ def run(script: str) -> None:
 
 
 def main(jobs: int) -> None:
-    """Run what is stale; the screenshots know by themselves."""
+    """Run the stale scripts, and the screenshots, which check for themselves."""
     with ThreadPoolExecutor(jobs) as pool:
         command = [sys.executable, str(DOCS / "screenshots.py")]
         pages = pool.submit(subprocess.run, command, check=True)

@@ -1,8 +1,8 @@
-"""Pages as a phone and a window show them; said in words where Chromium is missing.
+"""Screenshots of HTML pages at the width of a phone and of a window.
 
-``python docs/screenshots.py``, which ``make docs`` calls through ``pictures.py``; a minute or so,
-nothing where the program is as before. Writes ``docs/_build/screens.md``, which ``docs/pages.md``
-takes in.
+``python docs/screenshots.py``, which ``make docs`` calls through ``pictures.py``, takes about a
+minute, and does nothing if the program has not changed. It writes ``docs/_build/screens.md``, which
+``docs/pages.md`` includes; without Chromium that file only says so.
 """
 
 import shutil
@@ -19,24 +19,27 @@ WORDS = BUILD / "screens.md"
 STAMP = BUILD / ".screens.made"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PHONE, WINDOW, HEIGHT = 390, 1280, 1100  # px
-SPARE = 100  # px at the foot, which a busy browser may leave unpainted
+SPARE = 100  # px at the bottom, which a busy browser may leave unpainted
 
 PAGES = {
     "report": ("One recording", "report demo/data.h5 --record 5 --model demo/model.wsm -o"),
     "zoom": (
-        "A recording to zoom and measure in",
+        "Interactive plots of a recording",
         "info demo/data.h5 --record 5 --interactive --plot",
     ),
     "card": ("A data set", "info demo/data.h5 --card"),
-    "evaluate": ("A model judged", "evaluate demo/model.wsm demo/data.h5 --quick -j 1 -o"),
+    "evaluate": ("Evaluation of a model", "evaluate demo/model.wsm demo/data.h5 --quick -j 1 -o"),
     "align": ("A shaft line", "align propulsion-shaft --set bearings.2.sag=1.6mm -o"),
-    "chart": ("How much model", "chart journal-bearing --set duration=0.3 --budget 10 -j 1 -o"),
+    "chart": (
+        "Speed against accuracy",
+        "chart journal-bearing --set duration=0.3 --budget 10 -j 1 -o",
+    ),
     "atlas": (
-        "Where methods fail",
+        "Where numerical methods fail",
         "stability journal-bearing --map eccentricity-mesh --size 6 -o",
     ),
 }
-"""Kind -> heading and command, to which the page is added."""
+"""Kind -> heading and command, without the name of the page."""
 
 SIDE_BY_SIDE = """<!DOCTYPE html><meta charset="utf-8">
 <body style="margin: 0; display: flex; gap: 20px; background: #9aa3ab">
@@ -45,13 +48,16 @@ SIDE_BY_SIDE = """<!DOCTYPE html><meta charset="utf-8">
 
 
 def wearstate(command: str) -> None:
-    """Run a command of the program in the folder of the build."""
+    """Run a wearstate command in the build folder."""
     program = [sys.executable, "-m", "wearstate", *command.split()]
     subprocess.run(program, check=True, capture_output=True, cwd=BUILD)
 
 
 def shoot(browser: str, kind: str, command: str) -> None:
-    """Write a page, and its picture at both widths: a window alone is never so narrow."""
+    """Write a page and a picture of it at both widths.
+
+    Frames show them, because a browser window cannot be as narrow as a phone.
+    """
     wearstate(f"{command} {kind}.html --force")
     html = (BUILD / f"{kind}.html").read_text(encoding="utf-8")
     sizes = {"phone": PHONE, "window": WINDOW, "height": HEIGHT}
@@ -67,7 +73,7 @@ def shoot(browser: str, kind: str, command: str) -> None:
 
 
 def main() -> None:
-    """Make the pictures and the words about them, where the program has changed since."""
+    """Make the screenshots and the text around them if the program has changed."""
     BUILD.mkdir(exist_ok=True)
     browser = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if browser is None:

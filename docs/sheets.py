@@ -1,4 +1,4 @@
-"""What the scripts of figures share: colours, sheets of axes, and how figures are written."""
+"""Shared by the scripts of figures: colours, sheets of axes, writing of figures."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -25,13 +25,13 @@ def label(axes: Any, x: str, y: str, title: str = "", legend: str = "best") -> N
 
 
 def write(figures: Mapping[str, Callable[[], Figure]], folder: Path, *, dpi: int = 90) -> None:
-    """Draw every figure into a folder, and print where."""
+    """Draw every figure into a folder, and print its path."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in figures.items():
         draw().savefig(folder / f"{name}.png", dpi=dpi)
         print(folder / f"{name}.png", flush=True)
 
 
-def folder_asked() -> Path:
-    """The folder that the command line names, else that of the site's pictures."""
+def output_folder() -> Path:
+    """Folder named on the command line, by default that of the site's pictures."""
     return Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img"

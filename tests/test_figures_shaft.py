@@ -68,10 +68,10 @@ def test_peaks_fall_where_the_push_hears_the_films(figures, monkeypatch):
 
 def test_films_and_sensors_count_for_more_than_averages(figures, monkeypatch):
     monkeypatch.setattr(figures, "BURSTS", (10, 100))
-    told = figures.told_sags.__wrapped__
-    four = told("third", "y", 4, 0.03)
+    sags = figures.detectable_sags.__wrapped__
+    four = sags("third", "y", 4, 0.03)
     assert 0.07 < four[1] < four[0] < 0.12
-    assert told("third", "y", 4, 0.01)[0] < 0.5 * four[0]
-    one = told("third", "y", 1, 0.03)
+    assert sags("third", "y", 4, 0.01)[0] < 0.5 * four[0]
+    one = sags("third", "y", 1, 0.03)
     assert one[0] > 1.5 * four[0]
     assert one[1] < 0.7 * one[0]

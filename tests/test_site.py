@@ -1,4 +1,4 @@
-"""The documentation site: what can be told without building it, which ``make docs`` does."""
+"""The documentation site: checks that need no build; ``make docs`` builds it."""
 
 import ast
 import importlib
@@ -121,7 +121,7 @@ def test_pictures_are_made_again_when_the_program_changes(tmp_path, monkeypatch)
     said = f"{'what it shows ' * 30}\n{tmp_path / 'a.png'}\n"
     done = types.SimpleNamespace(stdout=said)
     monkeypatch.setattr(pictures.subprocess, "run", lambda *_, **__: done)
-    pictures.run(script)  # a sentence is no picture, and too long for a file's name
+    pictures.run(script)  # only the line with the path is taken for a picture
     assert not pictures.stale(script)
 
 
@@ -173,13 +173,13 @@ def run_shell(text):
 
 
 def torch_stand_in():
-    """What the guide asks of torch, where that is not installed: our side of it is tested."""
+    """The parts of torch that the guide uses, for testing it without torch installed."""
 
     class Subset:
         def __init__(self, data, rows):
             self.data, self.rows = data, rows
 
-    def load(subset, *, batch_size, shuffle, collate_fn, num_workers=0):
+    def load(subset, *, batch_size, shuffle, collate_fn):
         assert shuffle
         for first in range(0, len(subset.rows), batch_size):
             yield collate_fn([subset.data[i] for i in subset.rows[first : first + batch_size]])
@@ -227,15 +227,12 @@ def test_the_reader_of_guides_sees_an_error():
 
 WRITTEN = {"README": DOCS.parent / "README.md", **{name: DOCS / f"{name}.md" for name in pages()}}
 ELSEWHERE = ("README", "datasets", "theory/force-map")
-"""Pages with blocks of Python that are no guides."""
+"""Pages with blocks of Python other than guides."""
 
 
 @pytest.mark.parametrize("name", ELSEWHERE)
 def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch, request):
     text = WRITTEN[name].read_text(encoding="utf-8")
-    if "import torch" in text and importlib.util.find_spec("torch") is None:
-        for module, stand_in in torch_stand_in().items():
-            monkeypatch.setitem(sys.modules, module, stand_in)
     for file, fixture in (("data.h5", "small_set"), ("pump.wsm", "small_model")):
         if file in text:
             (tmp_path / file).symlink_to(request.getfixturevalue(fixture))

@@ -2,7 +2,7 @@
 A worn crank pin
 ================
 
-Each reversal of the rod force sends the pin across its clearance, and the casing rings: the
+At each reversal of the rod force the pin crosses its clearance, and the casing rings: the
 channels of a pump with 0.25 mm of clearance, over two revolutions.
 """
 

@@ -2,8 +2,8 @@
 Force on the crank pin over a revolution
 ========================================
 
-As new and worn: with clearance the pin is thrown across after the upper dead centre and lands
-hard.
+As new and worn: with clearance the pin is thrown across after the upper dead centre and ends in a
+hard impact.
 """
 
 import numpy as np

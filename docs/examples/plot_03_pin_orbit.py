@@ -3,7 +3,7 @@ The pin in its clearance circle
 ===============================
 
 The centre of the pin relative to that of its eye. It rests on one side, crosses, and strikes the
-other; the tail beyond the circle is the penetration of the contact.
+other; the tail outside the circle is the contact penetration.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 Spectra, as new and worn
 ========================
 
-Impacts excite the casing modes: the worn pump has more of everything above a few hundred hertz,
-most at its resonances.
+Impacts excite the casing modes: the worn pump vibrates more at all frequencies above a few hundred
+hertz, most at its resonances.
 """
 
 import wearstate

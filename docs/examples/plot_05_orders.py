@@ -2,7 +2,7 @@
 Orders of a pump
 ================
 
-Over the shaft order a spectrum does not smear when the speed wanders. Harmonics of one impact a
+An order spectrum does not smear when the speed varies. The harmonics of one impact per
 revolution are strongest at the lowest casing mode, 142 Hz, near order 28.
 """
 

@@ -3,7 +3,7 @@ Envelope spectrum of a worn crank pin
 =====================================
 
 The envelope of a resonance band has a line at every harmonic of the shaft speed, 5 Hz: one impact
-a revolution.
+per revolution.
 """
 
 import wearstate

@@ -3,7 +3,7 @@ Features over clearance
 =======================
 
 Rms, kurtosis and crest factor of one machine as its clearance grows; each is divided by its value
-as new. No single one tells the wear by itself.
+as new. No single one suffices to estimate the wear.
 """
 
 import wearstate

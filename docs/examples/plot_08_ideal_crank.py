@@ -2,7 +2,7 @@
 Forces of a slider-crank without clearance
 ==========================================
 
-Inverse dynamics in closed form: the force that the rod puts on the crank pin, at three speeds.
+Inverse dynamics in closed form: the force of the rod on the crank pin, at three speeds.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 Flow ripple of pumps with one to seven cylinders
 ================================================
 
-Odd numbers ripple least: their strokes overlap. Ideal pumps, incompressible, valves without
-delay.
+Odd numbers have the least ripple, because their strokes overlap. Ideal pumps, incompressible,
+valves without delay.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 Eccentricity over the Sommerfeld number
 =======================================
 
-The chart from which bearings are read, computed for three lengths. A small Sommerfeld number is a
+The usual design chart of bearings, computed for three lengths. A small Sommerfeld number means a
 heavy load.
 """
 

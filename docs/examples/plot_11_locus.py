@@ -2,7 +2,7 @@
 Path of the journal centre as the load grows
 ============================================
 
-From the middle of an unloaded bearing to the wall under the load, along nearly half a circle.
+From the centre of an unloaded bearing to the wall under the load, along nearly half a circle.
 """
 
 import numpy as np

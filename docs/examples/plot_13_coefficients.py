@@ -2,8 +2,8 @@
 Stiffness and damping of an oil film
 ====================================
 
-The eight coefficients over the eccentricity, of the load over the clearance. At small
-eccentricities the two cross stiffnesses differ in sign: that is what makes rotors whirl.
+The eight coefficients over the eccentricity, in units of load over clearance. At small
+eccentricities the two cross stiffnesses differ in sign, which makes rotors whirl.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 Speed at which a rigid rotor begins to whirl
 ============================================
 
-Above the line a rotor on two such bearings whirls at about half its speed. The lines end where
-there is no threshold any more: a journal as eccentric as that never whirls.
+Above the line a rotor on two such bearings whirls at about half its speed. The lines end at the
+eccentricity above which a journal never whirls.
 """
 
 import numpy as np

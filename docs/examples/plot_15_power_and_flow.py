@@ -2,7 +2,7 @@
 Power loss and oil flow of a bearing
 ====================================
 
-A bearing of 100 mm at 1500 rpm under a growing load.
+A bearing of 100 mm at 1500 rpm under increasing load.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """
-How far the cheap film models are off
-=====================================
+Error of the cheap film models
+==============================
 
 Load of the short, the long and the one-dimensional film over that of the film solved on a mesh,
 at an eccentricity of 0.6.

@@ -1,8 +1,8 @@
 """
-A worn bore carries the journal elsewhere
-=========================================
+Position of the journal in a worn bore
+======================================
 
-A scar in the shape of the shaft lets the journal sink: eccentricity and attitude angle over the
+A scar in the shape of the shaft lowers the journal: eccentricity and attitude angle over the
 load, round and worn.
 """
 

@@ -3,7 +3,7 @@ Half-speed whirl of a journal
 =============================
 
 The probes of a journal above its threshold. A small disturbance grows until the whirl fills the
-clearance; one orbit takes two revolutions, so the tacho marks lie in two groups.
+clearance; one orbit takes two revolutions, so the tacho marks form two groups.
 """
 
 import wearstate

@@ -2,7 +2,7 @@
 Full spectrum of a whirling journal
 ===================================
 
-Forward motion stands at positive frequencies, backward motion at negative ones. Whirl is forward,
+Forward motion is at positive frequencies, backward motion at negative ones. Whirl is forward,
 near half the shaft speed.
 """
 

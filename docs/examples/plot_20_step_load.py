@@ -2,8 +2,8 @@
 A journal under a step of load
 ==============================
 
-Let go in the middle of its bearing, the journal settles; when the load jumps it goes to a second
-place.
+Released at the centre of its bearing, the journal settles; after the load step it moves to a second
+equilibrium.
 """
 
 import wearstate

@@ -2,7 +2,7 @@
 Campbell diagram
 ================
 
-Natural frequencies of a rotor over its speed: gyroscopic moments part forward from backward
+Natural frequencies of a rotor over its speed: gyroscopic moments separate forward from backward
 modes. Where a mode meets the dashed line, unbalance excites it.
 """
 

@@ -2,8 +2,8 @@
 Unbalance response through the critical speeds
 ==============================================
 
-Motion of the disc that 10 kg mm of unbalance keeps up, up and to the side: the bearings are
-stiffer sideways, so there are two peaks.
+Vertical and horizontal motion of the disc due to 10 kg mm of unbalance: the bearings are stiffer
+sideways, so there are two peaks.
 """
 
 import numpy as np

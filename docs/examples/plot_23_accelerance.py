@@ -2,7 +2,7 @@
 Accelerance of a shaft
 ======================
 
-What a perfect shaker test at the disc would measure, at the disc and at both ends.
+Result of an ideal shaker test with the force at the disc, measured there and at both ends.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 A shaft line on its oil films
 =============================
 
-Where the journals of a shaft rig run in their bearings, from 60 to 480 rpm: the films lift them
-and carry them aside.
+Positions of the journals of a shaft rig in their bearings, from 60 to 480 rpm: the films lift them
+and move them sideways.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """
-Bearing loads of a shaft line, and what a move does
-===================================================
+Bearing loads of a shaft line and the effect of a move
+======================================================
 
 Reactions of a propulsion shaft, and their change when one bearing is raised by 0.1 mm: the
 influence numbers of an alignment calculation.

@@ -2,8 +2,8 @@
 A jacking test
 ==============
 
-Load on a jack over its lift. The second line, after the bearing is free, goes back to zero lift
-at the load that tells the reaction.
+Load on a jack over its lift. The second line, after the bearing is free, extrapolated to zero lift,
+gives the reaction.
 """
 
 import numpy as np
@@ -18,4 +18,4 @@ axes.plot(1e3 * found.lifts, found.loads / 1e3, "o", ms=3)
 free = np.array([0, found.lifts[-1]])
 axes.plot(1e3 * free, (found.zero_load + found.second_slope * free) / 1e3, "--")
 axes.set(xlabel="lift [mm]", ylabel="load on the jack [kN]")
-axes.set_title(f"told {found.estimate / 1e3:.1f} kN, true {found.reaction / 1e3:.1f} kN")
+axes.set_title(f"estimated {found.estimate / 1e3:.1f} kN, true {found.reaction / 1e3:.1f} kN")

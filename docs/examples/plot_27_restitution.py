@@ -1,19 +1,19 @@
 """
-Contact laws give other restitutions than asked
-===============================================
+Specified and actual restitution of contact laws
+================================================
 
-Hysteresis laws of impact: the restitution that a free impact has over the one asked for. Of
-these, only the exact law keeps its word.
+Hysteresis laws of impact: restitution of a free impact over the specified one. Of these, only the
+exact law gives the specified value.
 """
 
 import numpy as np
 from matplotlib import pyplot as plt
 from wearstate import contact
 
-asked = np.linspace(0.34, 1.0, 40)
+specified = np.linspace(0.34, 1.0, 40)
 _, axes = plt.subplots(figsize=(6, 5), layout="constrained")
 for law in ("exact", "hunt-crossley", "lankarani-nikravesh", "flores", "gonthier"):
-    given = [contact.effective_restitution(contact.hysteresis(law, e)) for e in asked]
-    axes.plot(asked, given, label=law)
-axes.set(xlabel="restitution asked for [-]", ylabel="restitution given [-]")
+    actual = [contact.effective_restitution(contact.hysteresis(law, e)) for e in specified]
+    axes.plot(specified, actual, label=law)
+axes.set(xlabel="specified restitution [-]", ylabel="actual restitution [-]")
 axes.legend()

@@ -2,7 +2,7 @@
 Transfer function from a hammer test
 ====================================
 
-Twenty blows on the casing of a pump at rest: magnitude and coherence. Where the coherence falls
+Twenty impacts on the casing of a pump at rest: magnitude and coherence. Where the coherence is low,
 the estimate is noise.
 """
 

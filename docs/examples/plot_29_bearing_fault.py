@@ -2,7 +2,7 @@
 A rolling bearing with a fault in its outer race
 ================================================
 
-Synthetic: noise and a resonance struck at every passage of a roller. The envelope spectrum shows
+Synthetic: noise and a resonance excited at every passage of a roller. The envelope spectrum shows
 the fault frequency and its harmonics (dashed).
 """
 

@@ -2,7 +2,7 @@
 Which band shows the impacts
 ============================
 
-Kurtosis of every band of a tree: the best band of a worn pump is where its impacts ring and
+Kurtosis of bands of many widths: the best band of a worn pump is that in which its impacts ring and
 little else does.
 """
 

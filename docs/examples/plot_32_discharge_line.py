@@ -2,8 +2,8 @@
 Pulsation in a discharge line, and a damper
 ===========================================
 
-Ten metres of pipe behind a triplex pump: the pressure at its valves swings with the flow of all
-throws and rings at the pipe's own frequencies. Two litres of gas beside the valves calm it.
+Ten metres of pipe behind a triplex pump: the pressure at its valves varies with the flow of all
+throws and rings at the natural frequencies of the pipe. Two litres of gas at the valves damp it.
 """
 
 import numpy as np
