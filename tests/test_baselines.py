@@ -9,7 +9,14 @@ import pytest
 from numpy.testing import assert_allclose
 from wearstate.diagnose.evaluation import baselines
 from wearstate.diagnose.evaluation import foreign_features as foreign
-from wearstate.diagnose.evaluation.baselines import BASELINES, FOLDS, Side, choose, contest, side_of
+from wearstate.diagnose.evaluation.baselines import (
+    BASELINES,
+    FOLDS,
+    Side,
+    choose,
+    compare_baselines,
+    side_of,
+)
 from wearstate.diagnose.evaluation.foreign_features import (
     LEFT_OUT,
     PACKAGES,
@@ -51,7 +58,7 @@ def perfect(test):
 
 def entries(train, test, ours=None):
     draws = resampled(test.groups, n=200)
-    return contest(train, test, ours or perfect(test), EDGES, LIMIT, draws)
+    return compare_baselines(train, test, ours or perfect(test), EDGES, LIMIT, draws)
 
 
 # -- what they learn
@@ -132,7 +139,7 @@ def test_no_label_of_the_test_side_is_seen():
         assert_allclose(other[name]["mae_m"].value, np.abs(found - shuffled.severity).mean())
 
 
-# -- the contest
+# -- the comparison
 
 
 def test_what_did_not_run_says_why(monkeypatch):

@@ -109,7 +109,7 @@ def test_unusual_machines_are_drawn_again_as_they_were(case, small_set):
     assert min(distance[group] for group in test) > max(distance[group] for group in train)
     with pytest.raises(DataError, match=r"record 0 redrawn has diametral_clearance"):
         machine_distances(replace(drawn, seed=drawn.seed + 1))
-    with pytest.raises(DataError, match="no recipe to draw its machines from"):
+    with pytest.raises(DataError, match="no recipe to draw its machines"):
         machine_distances(replace(drawn, recipe=None))
 
 
@@ -590,7 +590,7 @@ def test_the_benchmark_fails_on_a_miss():
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (["a", "c"], "of the model's 2 features it lacks 1, such as b and has beside them 1, such"),
+        (["a", "c"], "of the model's 2 features it lacks 1, such as b and additionally has 1"),
         (["a"], "of the model's 2 features it lacks 1, such as b; use"),
         (["b", "a"], "of the model's 2 features it has another order; use"),
     ],

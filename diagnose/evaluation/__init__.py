@@ -1,4 +1,4 @@
-"""How good a wear model is on machines it has not seen, and against what.
+"""Accuracy of a wear model on unseen machines, compared with baselines.
 
 It may import ``sim.output``, ``datasets.file``, ``datasets.split``, ``diagnose.pages``,
 ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.healthy_reference``,

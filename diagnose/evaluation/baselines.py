@@ -1,4 +1,4 @@
-"""What a wear model must beat: the majority, one rms, and two generic methods of others."""
+"""Baselines of a wear model: the majority, one rms, and two generic third-party methods."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,14 +18,14 @@ Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 FOLDS = 5
-"""Of whole machines; each configuration of each baseline is fitted so often."""
+"""Number of folds of whole machines for each configuration of each baseline."""
 
 _SEED = 0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """What a baseline says of some recordings.
+    """Predictions of a baseline.
 
     Attributes
     ----------
@@ -43,11 +43,11 @@ Fit = Callable[[Float, Float, Index, Sequence[float]], Fitted]
 """Features, severity [m], grade, grade edges [m] -> a fitted baseline."""
 
 Change = Callable[[Float], Float]
-"""Features -> what is regressed on."""
+"""Features -> inputs of the regression."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rival:
+class BaselineMethod:
     """One row of :data:`BASELINES`.
 
     Attributes
@@ -56,11 +56,11 @@ class Rival:
     text : str
         Method and settings, in words.
     source : {"none", "rms", "tsfel", "minirocket"}
-        Its features.
+        Source of its features.
     configurations : callable
-        Number of feature columns -> fits to choose from by folds of whole machines.
+        Number of feature columns -> fits, to be selected in folds of whole machines.
     prepare : callable
-        Training features, without labels -> what is done to features before every fit.
+        Training features, without labels -> transform of features before every fit.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Rival:
 
 
 def choose(
-    baseline: Rival,
+    baseline: BaselineMethod,
     features: Float,
     severity: Float,
     groups: NDArray[Any],
@@ -79,27 +79,27 @@ def choose(
     *,
     seed: int = 0,
 ) -> tuple[Fitted, int]:
-    """Fit a baseline, its configuration chosen by folds of whole machines.
+    """Fit a baseline, with its configuration selected in folds of whole machines.
 
     Parameters
     ----------
-    baseline : Rival
+    baseline : BaselineMethod
     features : numpy.ndarray [shape=(n, n_features)]
     severity : numpy.ndarray [shape=(n,)]
         [m], > 0.
     groups : numpy.ndarray [shape=(n,)]
-        Machine of each record; with fewer than two, the first configuration is taken.
+        Machine of each record; with fewer than two, the first configuration is used.
     edges : sequence of float
         Grade edges [m].
     seed : int
-        Of the folds.
+        Seed of the folds.
 
     Returns
     -------
     fitted : callable
         Features -> :class:`Prediction`.
     configurations : int
-        Tried, by the mean absolute error of the severity out of fold.
+        Number of configurations compared by their out-of-fold mean absolute error.
 
     Examples
     --------
@@ -153,7 +153,7 @@ def _majority(_columns: int) -> list[Fit]:
 
 
 def _single_rms(columns: int) -> list[Fit]:
-    # three thresholds part four grades; more let the one rms rise and fall with the wear
+    # three thresholds separate four grades; more allow an rms that is not monotonic in the wear
     return [_rms_fit(column, depth) for column in range(columns) for depth in (2, 4)]
 
 
@@ -173,7 +173,7 @@ def _rms_fit(column: int, depth: int) -> Fit:
     return fit
 
 
-_TREES = 100  # doubling them moves the error by less than its interval
+_TREES = 100  # doubling the number changes the error by less than its interval
 
 
 def _trees(_columns: int) -> list[Fit]:
@@ -204,15 +204,15 @@ def _ridge(_columns: int) -> list[Fit]:
     ]
 
 
-def _as_they_are(_features: Float) -> Change:
+def _unchanged(_features: Float) -> Change:
     return lambda rows: rows
 
 
-def _turned(features: Float) -> Change:
-    """Standardised, and turned into the space that the training rows span.
+def _rotated(features: Float) -> Change:
+    """Standardise features and rotate them into the space that the training rows span.
 
-    A ridge regression is the same in it, up to rounding, and costs a tenth of the time where
-    features are many times as many as rows.
+    A ridge regression is the same there, up to rounding, and takes a tenth of the time if there
+    are many more features than rows.
     """
     centre, spread = features.mean(axis=0), features.std(axis=0)
     scale = np.divide(1.0, spread, out=np.zeros_like(spread), where=spread > 0)
@@ -225,7 +225,7 @@ def _turned(features: Float) -> Change:
     return lambda rows: ((rows - centre) * scale) @ axes
 
 
-_ROUNDING = 1e-10  # of the largest: directions that only rounding spans
+_ROUNDING = 1e-10  # of the largest eigenvalue: smaller ones are due to rounding
 
 
 def _regression(make: Callable[[], Any], *, logarithmic: bool) -> Fit:
@@ -235,7 +235,7 @@ def _regression(make: Callable[[], Any], *, logarithmic: bool) -> Fit:
 
         def predict(rows: Float) -> Prediction:
             found = np.asarray(model.predict(rows), dtype=float)
-            # nobody believes a wear beyond twice the most it was trained on
+            # a wear beyond twice the largest in training is not credible
             found = np.exp(found) if logarithmic else found * severity.max()
             found = np.clip(found, 0, 2 * severity.max())
             return Prediction(severity=found, grade=grades_of(found, edges))
@@ -246,38 +246,38 @@ def _regression(make: Callable[[], Any], *, logarithmic: bool) -> Fit:
 
 
 BASELINES = (
-    Rival(
+    BaselineMethod(
         name="majority",
         text="the most frequent grade and the median severity of the training records",
         source="none",
         configurations=_majority,
-        prepare=_as_they_are,
+        prepare=_unchanged,
     ),
-    Rival(
+    BaselineMethod(
         name="single_rms",
         text="thresholds on the rms of one channel, channel and depth (2, 4) chosen by folds",
         source="rms",
         configurations=_single_rms,
-        prepare=_as_they_are,
+        prepare=_unchanged,
     ),
-    Rival(
+    BaselineMethod(
         name="tsfel",
         text="all default TSFEL features of every channel and the speed, 100 extra-trees; share of "
         "features (.03, .1, .2, .35, .5) and least leaf (1, 3) chosen by folds",
         source="tsfel",
         configurations=_trees,
-        prepare=_as_they_are,
+        prepare=_unchanged,
     ),
-    Rival(
+    BaselineMethod(
         name="minirocket",
         text="MiniRocket of aeon, 9,996 kernels over all channels, and the speed; ridge, penalty "
         "(3e1 to 3e5) and target (severity or its logarithm) chosen by folds",
         source="minirocket",
         configurations=_ridge,
-        prepare=_turned,
+        prepare=_rotated,
     ),
 )
-"""Name, settings, features, configurations. A new baseline is one row."""
+"""All baselines. A new one is one row."""
 
 
 # --- the contest ----------------------------------------------------------------------------------
@@ -290,14 +290,14 @@ class Side:
     Attributes
     ----------
     features : mapping
-        Source -> features [shape=(n, n_features)], or why there are none.
+        Source -> features [shape=(n, n_features)], or the reason for their absence.
     severity : numpy.ndarray [shape=(n,)]
         [m]
     groups : numpy.ndarray [shape=(n,)]
         Machine of each record.
     fitted : dict
-        Baselines that were fitted to it, with the number of configurations tried, by name: tuning
-        one takes minutes, and a side may train for many contests.
+        Fitted baselines with the number of configurations tried, by name: tuning one takes
+        minutes, and a side may be used in many comparisons.
     """
 
     features: Mapping[str, Float | str]
@@ -312,17 +312,17 @@ def side_of(
     rows: Index,
     foreign: Mapping[str, Float | str] | None = None,
 ) -> Side:
-    """Some rows of a feature table as a side.
+    """Make a side from rows of a feature table.
 
     Parameters
     ----------
     table : FeatureTable
     severity : str
-        Column of its manifest.
+        Severity column of its manifest.
     rows : numpy.ndarray
     foreign : mapping, optional
-        Source -> features of all rows of the table [shape=(n_records, n_features)], or why there
-        are none. Where the table knows the shaft speed, it is added to them as a column.
+        Source -> features of all rows of the table [shape=(n_records, n_features)], or the reason
+        for their absence. The shaft speed is added as a column if the table has it.
 
     Returns
     -------
@@ -343,7 +343,7 @@ def side_of(
     )
 
 
-def contest(
+def compare_baselines(
     train: Side | None,
     test: Side,
     ours: Judged,
@@ -353,33 +353,33 @@ def contest(
     *,
     seed: int = 0,
 ) -> dict[str, dict[str, Any]]:
-    """Every baseline on the records that a model was judged on.
+    """Evaluate every baseline on the records used for a model.
 
     Parameters
     ----------
     train : Side or None
-        None: every baseline is trained and judged by folds of whole machines of `test`, which
-        flatters it. A side serves contests of the same edges and seed.
+        None: every baseline is trained and judged in folds of whole machines of `test`, which
+        favours it. A side can be reused with the same edges and seed.
     test : Side
     ours : Judged
-        The model, on the same records.
+        Results of the model on the same records.
     edges : sequence of float
         Grade edges [m].
     limit : float
         Condemning limit [m].
     draws : Resamples
-        Of the records of `test`.
+        Resamples of the records of `test`.
     seed : int
-        Of the folds.
+        Seed of the folds.
 
     Returns
     -------
     dict
-        Name -> ``text``, and either ``missing`` (why it did not run) or the figures of
-        :func:`wearstate.diagnose.learning.scores.figures` that a method without intervals has,
-        ``configurations``, ``folds``, ``flattered`` and the difference of the mean error, ours
-        minus its own, over the limit: ``difference`` over the records that the model graded,
-        ``difference_all`` over all. No figure is quietly left out.
+        Name -> ``text``, and either ``missing`` (why it did not run) or those figures of
+        :func:`wearstate.diagnose.learning.scores.figures` that need no intervals,
+        ``configurations``, ``folds``, ``flattered`` and the difference of the mean error, model
+        minus baseline, over the limit: ``difference`` over the records that the model graded,
+        ``difference_all`` over all.
     """
     return {
         baseline.name: {
@@ -391,7 +391,7 @@ def contest(
 
 
 def _entry(
-    baseline: Rival,
+    baseline: BaselineMethod,
     train: Side | None,
     test: Side,
     ours: Judged,
@@ -406,19 +406,24 @@ def _entry(
         return {"missing": next(filter(None, why))}
     if train is None and len(np.unique(test.groups)) < 2:
         return {"missing": "nothing to train it on: one machine only"}
-    told, tried = _told(baseline, train, test, edges, seed)
+    predicted, tried = _predicted(baseline, train, test, edges, seed)
     judged = point_judged(
-        test.groups, test.severity, told.severity, told.grade, len(edges) + 1, graded=ours.graded
+        test.groups,
+        test.severity,
+        predicted.severity,
+        predicted.grade,
+        len(edges) + 1,
+        graded=ours.graded,
     )
-    apart = np.abs(ours.found - ours.truth) - np.abs(judged.found - judged.truth)
+    difference = np.abs(ours.found - ours.truth) - np.abs(judged.found - judged.truth)
     return {
         "missing": "",
         **{k: v for k, v in figures(judged, edges, limit, draws).items() if k in _POINT_FIGURES},
         "configurations": tried,
         "folds": FOLDS,
         "flattered": train is None,
-        "difference": share(apart * ours.graded / limit, ours.graded, draws),
-        "difference_all": share(apart / limit, np.ones(len(apart)), draws),
+        "difference": share(difference * ours.graded / limit, ours.graded, draws),
+        "difference_all": share(difference / limit, np.ones(len(difference)), draws),
     }
 
 
@@ -437,16 +442,16 @@ _POINT_FIGURES = (
 )
 
 
-def _absence(baseline: Rival, side: Side) -> str:
-    """Why a side has no features for a baseline; empty where it has."""
+def _absence(baseline: BaselineMethod, side: Side) -> str:
+    """Why a side has no features for a baseline; empty if it has."""
     found = side.features.get(baseline.source)
     if found is None:
         return absence(baseline.source) or LEFT_OUT
     return found if isinstance(found, str) else ""
 
 
-def _told(
-    baseline: Rival, train: Side | None, test: Side, edges: Sequence[float], seed: int
+def _predicted(
+    baseline: BaselineMethod, train: Side | None, test: Side, edges: Sequence[float], seed: int
 ) -> tuple[Prediction, int]:
     """Predictions of the test side, and the number of configurations tried."""
     rows = np.asarray(test.features[baseline.source])
@@ -459,9 +464,9 @@ def _told(
         return fitted(rows), tried
     severity, grade, tried = np.empty(len(rows)), np.empty(len(rows), dtype=np.intp), 0
     folds = min(FOLDS, len(np.unique(test.groups)))
-    for known, asked in group_folds(test.groups, n=folds, seed=seed):
+    for known, held in group_folds(test.groups, n=folds, seed=seed):
         mine = test.severity[known], test.groups[known]
         fitted, tried = choose(baseline, rows[known], *mine, edges, seed=seed)
-        told = fitted(rows[asked])
-        severity[asked], grade[asked] = told.severity, told.grade
+        predicted = fitted(rows[held])
+        severity[held], grade[held] = predicted.severity, predicted.grade
     return Prediction(severity=severity, grade=grade), tried

@@ -1,4 +1,4 @@
-"""How good is a wear model on machines it has not seen, and against what."""
+"""Accuracy of a wear model on unseen machines, compared with baselines."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,39 +42,39 @@ from ..learning.severity import Estimator
 from ..wear_model.estimate import WearModel
 from ..wear_model.train import draw_identity
 from ..wear_model.verdict import Estimate
-from .baselines import Side, contest, side_of
+from .baselines import Side, compare_baselines, side_of
 from .foreign_features import transformed_rows
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 P_LEVELS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
-"""Where novelty p-values are held against an even spread."""
+"""Levels at which novelty p-values are compared with a uniform distribution."""
 
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-"""Nominal coverages at which intervals and sets are held against the truth."""
+"""Nominal coverages at which intervals and sets are compared with the truth."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Background:
-    """What a model is judged against beside the records in question.
+    """Data for the baselines, in addition to the judged records.
 
     Attributes
     ----------
     train : Side or None
-        Training records for the baselines; None: those of the judged table that are not judged,
-        or, where there are none, folds of the judged ones.
+        Training records of the baselines; None: the records of the table that are not judged, or,
+        without any, folds of the judged ones.
     foreign : mapping
-        Source -> features by the packages of others, of all rows of the judged table, or why there
-        are none; see :func:`wearstate.diagnose.evaluation.baselines.side_of`.
+        Source -> features by third-party packages for all rows of the judged table, or the reason
+        for their absence; see :func:`wearstate.diagnose.evaluation.baselines.side_of`.
     """
 
     train: Side | None = None
     foreign: Mapping[str, Float | str] | None = None
 
 
-NOTHING = Background()
-"""The cheap baselines only, trained on the rest of the judged table."""
+NO_BACKGROUND = Background()
+"""Only the cheap baselines, trained on the rest of the judged table."""
 
 
 def evaluate_model(
@@ -91,48 +91,47 @@ def evaluate_model(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Judge a model on a data set, on machine draws that it was not trained on.
+    """Judge a model on a data set, using machine draws that it was not trained on.
 
     Parameters
     ----------
     model : WearModel
     path : str or Path
-        Labelled data set. Where its machine draws are those of the training set, only the draws
-        held out there are used.
+        Labelled data set. If its machine draws are those of the training set, only the draws held
+        out there are used.
     views : sequence of CompletingView
-        Data sets that complete the records, as the model needs them; records that lack one are
-        left out.
+        Data sets that complete the records, as the model needs them; incomplete records are left
+        out.
     trained_on : str or Path, optional
-        The model's training set, for the baselines. Without it they are trained on what `path`
-        has of it, or, where it has none, by folds of the judged machines, which flatters them.
+        The model's training set, for the baselines. By default they are trained on its records in
+        `path`, or, without any, in folds of the judged machines, which favours them.
     healthy : str or Path, optional
         Healthy records of the same machines, for a referenced model.
     split : str, optional
-        A split that the data set's file holds: all of its test side is judged. Where the model
-        has learnt from none of its records, the baselines learn from its training side.
+        A split stored in the data set: all of its test side is judged. If the model was trained on
+        none of its records, the baselines are trained on its training side.
     quick : bool
-        Leave out the baselines that need packages of others: these take seconds per recording.
+        Leave out the baselines that need third-party packages, which take seconds per recording.
     cache : Path, optional
-        Folder in which features of such packages are kept.
+        Folder in which features of these packages are kept.
     jobs : int
         Worker processes for the features.
     seed : int
-        Of the resamples, and of the baselines.
+        Seed of the resamples and of the baselines.
     progress : callable, optional
         Called with (records done, records).
 
     Returns
     -------
     dict
-        As :func:`score`; of a split ``split``, too: its ``name``, ``text`` and ``sha256``, and
-        whether the model was ``trained_with_it``.
+        As from :func:`score`; for a split also ``split``: its ``name``, ``text`` and ``sha256``,
+        and whether the model was ``trained_with_it``.
 
     Raises
     ------
     DataError
-        The severity of the model is not labelled, its features are others, no unseen machine
-        draw is left, the set named as training set is another, or the model has learnt from what
-        the split tests.
+        The severity of the model is not labelled, its features differ, no unseen machine draw is
+        left, `trained_on` is not its training set, or it was trained on the test side of the split.
     """
     sides = None if split is None else _sides(path, split)
     if healthy is not None:
@@ -193,7 +192,7 @@ def _split_card(model: WearModel, sides: Sides) -> dict[str, Any]:
 
 
 def trained_rows(model: WearModel, table: FeatureTable) -> Index:
-    """Rows of a table whose signals are, byte for byte, training signals of a model."""
+    """Rows of a table whose signals are identical to training signals of a model."""
     known = table.manifest["signal_crc32"].isin(model.card.trained_on.training_signals)
     return np.flatnonzero(known)
 
@@ -208,14 +207,14 @@ def judged_rows(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> tuple[FeatureTable, Index]:
-    """Feature table of a data set, and its rows that a model can be judged on.
+    """Feature table of a data set, and the rows on which a model can be judged.
 
-    These are the test side of a split, where one is given.
+    With a split, these are its test side.
 
     Raises
     ------
     DataError
-        As of :func:`evaluate_model`.
+        As in :func:`evaluate_model`.
     """
     with DataSet(path) as data:
         head = data.attributes
@@ -238,7 +237,7 @@ def judged_rows(
 def _views_of(
     model: WearModel, views: Sequence[CompletingView], path: str | Path
 ) -> tuple[CompletingView, ...]:
-    """Views in the order of the model; they must be its own."""
+    """Views in the order of the model; raise if they are not those of the model."""
     known = {view.name: view for view in views}
     wanted = model.card.views
     if set(known) != set(wanted):
@@ -252,15 +251,15 @@ def _views_of(
 def unseen_rows(
     model: WearModel, table: FeatureTable, identity: str, path: str | Path
 ) -> NDArray[np.intp]:
-    """Rows of machine draws that the model was not trained on.
+    """Rows of machine draws on which the model was not trained.
 
-    A draw is seen where recipe name and seed are those of the training set and its number was in
-    training, or where any of its signals is, byte for byte, a training signal.
+    A draw counts as seen if recipe name and seed are those of the training set and its number was
+    in training, or if any of its signals is identical to a training signal.
 
     Raises
     ------
     DataError
-        None is left, or the features are not the model's.
+        None is left, or the features are not those of the model.
     """
     _check_features(model, table, path)
     rows = np.flatnonzero(~_seen_machines(model, table, identity))
@@ -275,14 +274,14 @@ def unseen_rows(
 def tested_rows(
     model: WearModel, table: FeatureTable, sides: Sides, identity: str, path: str | Path
 ) -> Index:
-    """Rows of a split's test side, of which the model must have seen no record and no machine.
+    """Rows of a split's test side, whose records and machines must be unseen by the model.
 
-    Where machines are on both sides by design, it must have seen no record.
+    If machines are on both sides by design, only the records must be unseen.
 
     Raises
     ------
     DataError
-        It has, or the features are not the model's.
+        Some have been seen, or the features are not those of the model.
     """
     _check_features(model, table, path)
     seen = np.isin(np.arange(len(table.values)), trained_rows(model, table))
@@ -300,12 +299,12 @@ def tested_rows(
 
 
 def refuse_other_severity(model: WearModel, head: Attributes, path: str | Path) -> None:
-    """Refuse a data set that is not labelled with the severity of a model.
+    """Reject a data set that is not labelled with the severity of a model.
 
     Raises
     ------
     DataError
-        Names both.
+        The severities differ; the message names both.
     """
     wanted = model.card.severity
     if wanted not in head.severities:
@@ -325,18 +324,19 @@ def _check_features(model: WearModel, table: FeatureTable, path: str | Path) -> 
 
 
 def _difference(names: Sequence[str], wanted: Sequence[str]) -> str:
-    """In what the features of a data set differ from those that a model needs."""
-    sides = [("lacks", wanted, names), ("has beside them", names, wanted)]
-    told = [
+    """Differences between the features of a data set and those that a model needs."""
+    sides = [("lacks", wanted, names), ("additionally has", names, wanted)]
+    differences = [
         f"{verb} {len(odd)}, such as {odd[0]}"
         for verb, some, others in sides
         if (odd := [name for name in some if name not in set(others)])
     ]
-    return f"of the model's {len(wanted)} features it {' and '.join(told) or 'has another order'}"
+    what = " and ".join(differences) or "has another order"
+    return f"of the model's {len(wanted)} features it {what}"
 
 
 def _seen_machines(model: WearModel, table: FeatureTable, identity: str) -> NDArray[np.bool_]:
-    """Records of machines that the model was trained on."""
+    """Records of machines on which the model was trained."""
     trained = model.card.trained_on
     groups = table.manifest["group"].to_numpy()
     seen = np.isin(groups, groups[trained_rows(model, table)])
@@ -351,7 +351,7 @@ def score(
     rows: Index,
     *,
     references: Float | None = None,
-    background: Background = NOTHING,
+    background: Background = NO_BACKGROUND,
     seed: int = 0,
 ) -> dict[str, Any]:
     """Errors, coverage and baselines on some rows of a table.
@@ -360,25 +360,25 @@ def score(
     ----------
     model : WearModel
     table : FeatureTable
-        With the model's features and its severity.
+        Table with the model's features and its severity.
     rows : numpy.ndarray
         Rows to judge on.
     references : numpy.ndarray [shape=(n_records, n_features)], optional
         Healthy features of each row's machine, for a referenced model.
     background : Background
-        What the baselines are trained on, and their features.
+        Training data and features of the baselines.
     seed : int
-        Of the resamples and of the baselines' folds.
+        Seed of the resamples and of the baselines' folds.
 
     Returns
     -------
     dict
-        Ready for JSON, None where no record tells: ``records``, ``draws``; every figure of
+        Ready for JSON, None for a figure without records: ``records``, ``draws``; every figure of
         :data:`wearstate.diagnose.learning.scores.FIGURES` by name, and under ``intervals`` its 95 %
-        interval over machines; ``accuracy_bound`` (about what the error in metres allows),
+        interval over machines; ``accuracy_bound`` (about the best at that error in metres),
         ``nominal_coverage``, ``confusion`` (true grade by row, of the graded), ``reliability`` as
         :func:`reliability`, ``familiarity`` as :func:`p_value_shares`, ``baselines`` as
-        :func:`wearstate.diagnose.evaluation.baselines.contest`, ``by_confounder`` as
+        :func:`wearstate.diagnose.evaluation.baselines.compare_baselines`, ``by_confounder`` as
         :func:`by_confounder`, ``by_choice`` as :func:`by_choice`.
     """
     edges, limit = model.card.grade_edges_m, model.card.condemning_limit_m
@@ -407,7 +407,7 @@ def score(
         "confusion": confusion(true[mine], judged.grade[mine], len(edges) + 1),
         "reliability": reliability(model, judged, estimates, draws),
         "familiarity": p_value_shares(estimates, draws),
-        "baselines": contest(train, test, judged, edges, limit, draws, seed=seed),
+        "baselines": compare_baselines(train, test, judged, edges, limit, draws, seed=seed),
         "by_confounder": by_confounder(table.manifest.iloc[rows], **parts),
         "by_choice": by_choice(table.manifest.iloc[rows], **parts),
     }
@@ -417,7 +417,7 @@ def score(
 def judge_rows(
     model: WearModel, table: FeatureTable, rows: Index, references: Float | None = None
 ) -> tuple[Judged, list[Estimate]]:
-    """What a model says of some rows of a table.
+    """Apply a model to rows of a table.
 
     Parameters
     ----------
@@ -430,7 +430,7 @@ def judge_rows(
     Returns
     -------
     judged : Judged
-        Its estimate is the model's whatever the verdict.
+        Contains the estimate of the model whatever the verdict.
     estimates : list of Estimate
     """
     card = model.card
@@ -471,18 +471,18 @@ def reliability(
     Returns
     -------
     list of dict
-        ``nominal``, and ``interval`` and ``set``: shares that hold the truth.
+        ``nominal``, and ``interval`` and ``set``: shares that contain the truth.
     """
     found = []
     informed = np.array([bool(each.noted) for each in estimates])
-    asked = [(model.blind, ~informed)]
+    estimators = [(model.blind, ~informed)]
     if model.informed is not None:
-        asked.append((model.informed, informed))
+        estimators.append((model.informed, informed))
     for nominal in LEVELS:
         held = np.zeros((2, len(judged.truth)), dtype=bool)
-        for estimator, here in asked:
+        for estimator, rows in estimators:
             for cautious, those in ((False, ~judged.cautious), (True, judged.cautious)):
-                held |= _held(estimator, cautious, judged, here & those, model, nominal)
+                held |= _held(estimator, cautious, judged, rows & those, model, nominal)
         shares = [share(each.astype(np.float64), judged.graded, draws) for each in held]
         found.append({"nominal": nominal, "interval": shares[0], "set": shares[1]})
     return found
@@ -492,18 +492,18 @@ def _held(
     estimator: Estimator,
     cautious: bool,
     judged: Judged,
-    here: Mask,
+    rows: Mask,
     model: WearModel,
     nominal: float,
 ) -> Mask:
-    """Whether interval and set hold the truth, of graded records here [shape=(2, n)]."""
+    """Whether interval and set contain the truth, for graded records in `rows` [shape=(2, n)]."""
     edges = model.card.grade_edges_m
     held = np.zeros((2, len(judged.truth)), dtype=bool)
     given = estimator.ends(cautious=cautious)
     ends = estimator.ends(cautious=cautious, coverage=nominal)
     limits = grade_limits(estimator.known(cautious=cautious), edges, nominal)
-    for row in np.flatnonzero(judged.graded & here):
-        # what the interval at hand was made with tells the size of the error expected
+    for row in np.flatnonzero(judged.graded & rows):
+        # the given interval determines the size of the expected error
         size = float(np.log(judged.high[row] / judged.low[row]) / (given.low + given.high))
         low, high = interval(judged.found[row], size, ends)
         true = int(grades_of(judged.truth[row], edges))
@@ -513,10 +513,10 @@ def _held(
 
 
 def p_value_shares(estimates: Sequence[Estimate], draws: Resamples) -> list[dict[str, Any]]:
-    """Share of records whose novelty p-value is at or below each of :data:`P_LEVELS`.
+    """Share of records with a novelty p-value at or below each of :data:`P_LEVELS`.
 
-    Familiar records have as large a share as the level, or a smaller one; of records that are
-    told apart it is near one.
+    For familiar records the share is at most the level; for records recognised as unfamiliar it is
+    near one.
 
     Returns
     -------
@@ -537,24 +537,23 @@ def by_confounder(
     familiar: NDArray[np.bool_],
     covered: NDArray[np.bool_],
 ) -> dict[str, dict[str, Any]]:
-    """Errors apart for records with and without faults that are not the wear.
+    """Errors for records with and without faults other than the wear.
 
     Parameters
     ----------
     manifest : pandas.DataFrame
-        Of the records judged.
+        Manifest of the judged records.
     error : numpy.ndarray [shape=(n_records,)]
-        Of the severity [m], >= 0.
+        Error of the severity [m], >= 0.
     familiar, covered : numpy.ndarray [shape=(n_records,)]
-        Whether the record was graded, and whether its interval holds the truth.
+        Whether the record was graded, and whether its interval contains the truth.
 
     Returns
     -------
     dict
-        ``none``, each confounder that is alone, and ``combined`` (two or more), as far as there
-        are such records: ``records``, ``unfamiliar`` share, ``mae_all_m``, and over the familiar
-        ones (None without any) ``mae_m`` and ``coverage``. Empty where the data set has no
-        confounder.
+        ``none``, each single confounder, and ``combined`` (two or more), if there are such
+        records: ``records``, ``unfamiliar`` share, ``mae_all_m``, and over the familiar ones (None
+        without any) ``mae_m`` and ``coverage``. Empty if the data set has no confounder.
 
     Examples
     --------
@@ -584,21 +583,21 @@ def by_choice(
     familiar: NDArray[np.bool_],
     covered: NDArray[np.bool_],
 ) -> dict[str, dict[str, Any]]:
-    """Errors apart for each option of the recipe's choices, such as laws and lubrication.
+    """Errors for each option of the recipe's choices, such as laws and lubrication.
 
     Parameters
     ----------
     manifest : pandas.DataFrame
-        Of the records judged.
+        Manifest of the judged records.
     error : numpy.ndarray [shape=(n_records,)]
-        Of the severity [m], >= 0.
+        Error of the severity [m], >= 0.
     familiar, covered : numpy.ndarray [shape=(n_records,)]
-        Whether the record was graded, and whether its interval holds the truth.
+        Whether the record was graded, and whether its interval contains the truth.
 
     Returns
     -------
     dict
-        ``choice: option`` -> as of :func:`by_confounder`; empty where the recipe has no choice.
+        ``choice: option`` -> as in :func:`by_confounder`; empty if the recipe has no choice.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Pictures and page of an evaluation: errors by split, confusion, reliability, what is found."""
+"""Pictures and page of an evaluation: errors by split, confusion, reliability, detectability."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -21,11 +21,11 @@ _RIVALS = {
 }
 """Baseline -> colour and marker."""
 
-_BEYOND = 1.15  # of the axis: where an open end is drawn to
+_BEYOND = 1.15  # of the axis: position of an open end
 
 
 def made_splits(result: Result) -> list[Result]:
-    """Splits that could be made."""
+    """Splits that could be evaluated."""
     return [split for split in result["splits"] if not split["missing"]]
 
 
@@ -35,8 +35,8 @@ def evaluation_figure(result: Result) -> Any:
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`, with one split made at
-        least.
+        From :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`, with at least one split
+        made.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def evaluation_figure(result: Result) -> Any:
 
 
 def _panels(result: Result) -> list[tuple[str, str, Callable[[Any], None]]]:
-    """Name, caption and drawing of each picture that there are figures for."""
+    """Name, caption and drawing function of each picture with data."""
     splits = made_splits(result)
     first = splits[0]
     panels: list[tuple[str, str, Callable[[Any], None]]] = [
@@ -79,22 +79,22 @@ _ERRORS = (
 )
 _CONFUSION = "Split {}: true grade against the grade given; shares of each true grade."
 _RELIABILITY = (
-    "Share of intervals and of sets that hold the truth against the share asked for. On the line "
-    "or above it the promise is kept; far above, they are wider than need be."
+    "Share of intervals and of sets that contain the truth against the nominal share. On or above "
+    "the line the promise is kept; far above, they are wider than necessary."
 )
 _FAMILIARITY = (
     "Share of records whose novelty p-value is at or below a level. Records like the training "
-    "records follow the line; what is unlike them rises above it."
+    "records follow the line; others lie above it."
 )
 _LEARNING = "Mean error on the same unseen machines against the number of machines trained on."
 _FOUND = (
-    "Least wear that is found in nine cases of ten with one false alarm in twenty, by condition; "
+    "Smallest wear detected in nine of ten cases with one false alarm in twenty, by condition; "
     "bars are 95 % intervals over machines. Healthy: the tenth of the records with the least wear."
 )
 
 
 def draw_errors(axes: Any, splits: Sequence[Result]) -> None:
-    """Mean error by split, ours and the baselines'."""
+    """Mean error by split, of the model and the baselines."""
     for place, split in enumerate(splits):
         _draw_bar(
             axes,
@@ -125,7 +125,7 @@ def draw_errors(axes: Any, splits: Sequence[Result]) -> None:
 
 
 def _some_minor(value: float, _place: Any = None) -> str:
-    """Labels of 2 and 5 between the powers of ten: all of them would overlap."""
+    """Label only 2 and 5 between the powers of ten: all labels would overlap."""
     return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
@@ -173,7 +173,7 @@ def draw_reliability(axes: Any, split: Result) -> None:
             if row[name]["value"] is not None
         ]
         _draw_points(axes, known, colour, f"{name}s")
-    axes.set(xlabel="coverage asked for", ylabel="share that holds the truth", ylim=(0.4, 1.02))
+    axes.set(xlabel="nominal coverage", ylabel="share that contains the truth", ylim=(0.4, 1.02))
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="lower right")
 
@@ -229,7 +229,7 @@ def draw_learning(axes: Any, curve: Sequence[Result]) -> None:
 
 
 def draw_floors(axes: Any, rows: Sequence[Result], limit: float) -> None:
-    """Least wear that is found, by condition; the condemning limit [m] is 100 %."""
+    """Smallest detected wear by condition; the condemning limit [m] is 100 %."""
     found = [row["smallest_share_of_limit"] for row in rows]
     known = [v for each in found for v in each.values() if v is not None]
     edge = _BEYOND * 100 * max(known, default=1.0)
@@ -247,7 +247,7 @@ def draw_floors(axes: Any, rows: Sequence[Result], limit: float) -> None:
     axes.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.4, 1.0), frameon=False)
     axes.set_yticks(range(len(rows)), [short_name(row["condition"]) for row in rows], fontsize=8)
     axes.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, 1.03 * edge))
-    axes.set_xlabel("least wear found [% of the condemning limit]")
+    axes.set_xlabel("smallest wear detected [% of the condemning limit]")
     axes.grid(axis="x", alpha=0.3)
 
 
@@ -260,9 +260,9 @@ def evaluation_html(result: Result, *, notice: str = "") -> str:
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
+        From :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
     notice : str
-        Of the model, where it was trained on simulation.
+        Notice of the model, if it was trained on simulated data.
 
     Returns
     -------
@@ -284,25 +284,25 @@ def evaluation_html(result: Result, *, notice: str = "") -> str:
 
 
 def save_evaluation(result: Result, path: Path, *, notice: str = "", force: bool = True) -> None:
-    """Write an evaluation as a page, as a picture or as JSON, by the suffix.
+    """Write an evaluation as a page, a picture or JSON, depending on the suffix.
 
     Measured times (``cost``) are left out: the same evaluation gives the same bytes.
 
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
+        From :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
     path : Path
         ``.html``, ``.png``, ``.svg``, ``.pdf`` or ``.json``.
     notice : str
-        Of the model, for the page.
+        Notice of the model, for the page.
     force : bool
         Replace an existing file.
 
     Raises
     ------
     DataError
-        Another suffix, or a picture without a split that could be made.
+        The suffix is none of these, or there is no split for a picture.
     """
     import json
 

@@ -1,4 +1,4 @@
-"""Features that the packages of others compute, for the baselines that a model must beat."""
+"""Features computed by third-party packages, for the baselines of a model."""
 
 import hashlib
 import warnings
@@ -23,14 +23,14 @@ Index = NDArray[np.intp]
 PACKAGES = {"tsfel": "tsfel", "minirocket": "aeon"}
 """Source of features -> package that computes them."""
 
-LEFT_OUT = "left out: asked for without the packages of others"
+LEFT_OUT = "left out: requested without third-party packages"
 
-_KERNEL_EXAMPLES = 200  # recordings; MiniRocket takes a threshold from one of them at a time
+_KERNEL_EXAMPLES = 200  # recordings from which MiniRocket draws its thresholds
 _BATCH = 8  # recordings whose samples are in memory at once
 
 
 def absence(source: str) -> str:
-    """Why a source's features cannot be computed here, with the cure; empty where they can."""
+    """Why the features of a source cannot be computed, with the cure; empty if they can."""
     package = PACKAGES[source]
     if find_spec(package) is not None:
         return ""
@@ -38,20 +38,20 @@ def absence(source: str) -> str:
 
 
 Transform = Callable[[Sequence[Recording]], Float]
-"""Recordings of one rate and one set of channels -> feature rows."""
+"""Recordings of equal rate and channels -> feature rows."""
 
 
 def foreign_transform(source: str, examples: Iterable[Recording], *, seed: int = 0) -> Transform:
-    """Features that a package of others computes, of the vibration channels as they are.
+    """Features of the unprocessed vibration channels, computed by a third-party package.
 
     Parameters
     ----------
     source : {"tsfel", "minirocket"}
     examples : iterable of Recording
-        Training recordings. MiniRocket takes its thresholds from the first 200 of them, and of
-        every recording as many samples as the shortest of these has; TSFEL learns nothing.
+        Training recordings. MiniRocket takes its thresholds from the first 200 of them, and cuts
+        every recording to the length of the shortest of these; TSFEL needs no training.
     seed : int
-        Of MiniRocket.
+        Seed of MiniRocket.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def _tsfel() -> Transform:
 
     def row(recording: Recording) -> Float:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of pandas and numpy inside TSFEL
+            warnings.simplefilter("ignore")  # from pandas and numpy inside TSFEL
             table = tsfel.time_series_features_extractor(
                 settings, recording.vibration.T.astype(float), fs=recording.sample_rate, verbose=0
             )
@@ -103,15 +103,15 @@ def _stack(signals: Sequence[NDArray[Any]], length: int) -> NDArray[np.float32]:
 def foreign_rows(
     transform: Transform, recordings: Iterable[Recording], count: int, progress: Progress | None
 ) -> Float:
-    """Feature rows of many recordings, a few in memory at a time.
+    """Feature rows of many recordings, with a few in memory at a time.
 
     Parameters
     ----------
     transform : callable
-        Of :func:`foreign_transform`.
+        From :func:`foreign_transform`.
     recordings : iterable of Recording
     count : int
-        How many there are, for `progress`.
+        Number of recordings, for `progress`.
     progress : callable, optional
         Called with (recordings done, recordings).
 
@@ -130,16 +130,16 @@ def foreign_rows(
 
 @dataclass(frozen=True, kw_only=True)
 class TransformedRows:
-    """Features by the packages of others, made once and kept.
+    """Features by third-party packages, computed once and kept.
 
     Attributes
     ----------
     examples : numpy.ndarray
         Rows of the training data set from which MiniRocket takes its thresholds.
     transforms : mapping
-        Source -> features of recordings, of the packages that are installed.
+        Source -> transform of recordings into features, for the installed packages.
     seed : int
-        Of the choice of examples, and of MiniRocket.
+        Seed of the choice of examples, and of MiniRocket.
     cache : Path or None
         Folder in which features are kept: these packages take up to seconds per recording.
     progress : callable or None
@@ -153,7 +153,7 @@ class TransformedRows:
     progress: Progress | None
 
     def rows(self, path: Path, table: FeatureTable) -> dict[str, Float | str]:
-        """Source -> features of all rows of a data set's table, or why there are none."""
+        """Source -> features of all rows of a table, or the reason for their absence."""
         return {source: absence(source) or self._kept(source, path, table) for source in PACKAGES}
 
     def _kept(self, source: str, path: Path, table: FeatureTable) -> Float | str:
@@ -171,7 +171,7 @@ class TransformedRows:
         return rows
 
     def _name(self, source: str, table: FeatureTable) -> str:
-        """Changes with the package, the signals, and what the transform has learnt."""
+        """File name that depends on the package, the signals and the trained transform."""
         signals = table.manifest["signal_crc32"].to_numpy(dtype=np.int64)
         parts = [version(PACKAGES[source]).encode(), signals.tobytes()]
         if source == "minirocket":
@@ -195,11 +195,11 @@ def transformed_rows(
     path : Path
         Training data set.
     train : numpy.ndarray
-        Rows of its feature table that may be learnt from.
+        Rows of its feature table that may be used for training.
     seed, cache, progress
-        As of :class:`TransformedRows`.
+        As in :class:`TransformedRows`.
     quick : bool
-        Leave the packages of others out.
+        Leave out third-party packages.
     """
     examples = np.random.default_rng(seed).permutation(train)[:_KERNEL_EXAMPLES]
     return TransformedRows(
@@ -216,7 +216,7 @@ def transformed_rows(
 
 
 def recordings_of(path: Path, rows: Index) -> Iterator[Recording]:
-    """Recordings of rows of a data set's feature table, one in memory at a time."""
+    """Recordings of rows of a data set's feature table, with one in memory at a time."""
     with DataSet(path) as data:
         usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())
         for row in rows:

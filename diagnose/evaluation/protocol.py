@@ -1,4 +1,4 @@
-"""A model judged on every split, and what more training, less wear and less time do."""
+"""Evaluation of a model on every split, with learning curve, detectability and cost."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ from ..feature_rows.noted import notes_of
 from ..healthy_reference.healthy import Baseline
 from ..learning.scores import ScoreFigure, figures, plain, resampled, smallest_found
 from ..wear_model.estimate import WearModel
-from .baselines import BASELINES, Rival, choose
+from .baselines import BASELINES, BaselineMethod, choose
 from .evaluate import Background, judge_rows, score
 from .foreign_features import LEFT_OUT, PACKAGES, absence
 from .splits import ALL_SPLITS, HEALTHY_SHARE, NOISE, NOISY_RECORDS, SPLITS, Case, Say
@@ -30,12 +30,12 @@ Index = NDArray[np.intp]
 EVALUATION_SCHEMA = 1
 
 CURVE_MACHINES = (50, 100, 200, 400)
-"""Machines trained on, along the learning curve; all of them come last."""
+"""Numbers of training machines along the learning curve, before that of all machines."""
 
 FALSE_ALARM, DETECTION = 0.05, 0.9
 
 _TIMED_RECORDS = 8
-_FLOOR_RESAMPLES = 300  # each is a fit: their ends tell 2.5 % well enough
+_FLOOR_RESAMPLES = 300  # each is a fit: enough for the 2.5 % quantiles
 
 OWN, WHOLE = "wearstate", "wearstate, whole estimate"
 
@@ -46,24 +46,24 @@ OWN, WHOLE = "wearstate", "wearstate, whole estimate"
 def evaluate_splits(
     case: Case, names: Sequence[str] = ALL_SPLITS, *, say: Say | None = None
 ) -> dict[str, Any]:
-    """Train and judge on each split, with baselines, learning curve and detectability.
+    """Train and evaluate on each split, with baselines, learning curve and detectability.
 
     Parameters
     ----------
     case : Case
-        Of :func:`case_of`.
+        From :func:`case_of`.
     names : sequence of str
-        Of :data:`ALL_SPLITS`, or of the splits that the data set's file holds.
+        Names from :data:`ALL_SPLITS`, or of splits stored in the data set.
     say : callable, optional
-        Called with a line about each stage.
+        Called with a line for each stage.
 
     Returns
     -------
     dict
         Ready for JSON: ``schema_version``, the data set's name, size, limits and seed; ``splits``,
         each as :func:`wearstate.diagnose.evaluation.evaluate.score` with ``name``, ``text``,
-        ``train`` and ``missing`` (why it could not be made, else empty); and, where the random
-        split is among the names, ``learning_curve``, ``detectability`` and ``cost``.
+        ``train`` and ``missing`` (why it could not be made, else empty); and, if the random split
+        is among the names, ``learning_curve``, ``detectability`` and ``cost``.
 
     Raises
     ------
@@ -74,14 +74,14 @@ def evaluate_splits(
     unknown = [name for name in names if name not in known]
     if unknown:
         raise DataError(f"split = {unknown[0]!r} must be one of {', '.join(known)}, or all")
-    tell = say or (lambda _text: None)
+    report = say or (lambda _text: None)
     splits: list[dict[str, Any]] = []
     for name in names:
-        tell(f"split {name}")
+        report(f"split {name}")
         splits += _noisy(case) if name == NOISE else [_judged_split(case, name)]
     extra: dict[str, Any] = {}
     if "random" in names:
-        tell("learning curve, detectability, cost")
+        report("learning curve, detectability, cost")
         extra = {
             "learning_curve": learning_curve(case),
             "detectability": detectability(case, noise=NOISE in names),
@@ -105,15 +105,15 @@ def evaluate_splits(
 def one_split(
     result: Mapping[str, Any], model: WearModel, path: str | Path, seed: int
 ) -> dict[str, Any]:
-    """A finished model's judgement in the form of :func:`evaluate_splits`, for page and picture.
+    """Evaluation of a finished model in the form of :func:`evaluate_splits`, for page and picture.
 
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.evaluate.evaluate_model`.
+        From :func:`wearstate.diagnose.evaluation.evaluate.evaluate_model`.
     model : WearModel
     path : str or Path
-        Data set that it was judged on.
+        Data set of the evaluation.
     seed : int
     """
     with DataSet(path) as data:
@@ -168,7 +168,7 @@ def _judged_split(case: Case, name: str) -> dict[str, Any]:
 
 
 def _cut(case: Case, name: str) -> tuple[str, Index, Index]:
-    """What is held out, in words, and the rows of both sides."""
+    """Description of the held-out part, and the rows of both sides."""
     if name not in SPLITS:
         with DataSet(case.path) as data:
             sides = usable_sides(data, name)
@@ -187,7 +187,7 @@ def _noisy(case: Case) -> list[dict[str, Any]]:
     return [
         {
             "name": f"noise {level:g} dB",
-            "text": f"white noise {level:g} dB beside the as-new rms added to unseen machines",
+            "text": f"white noise at {level:g} dB re as-new rms added to unseen machines",
             "missing": "",
             "train": {"records": len(train), "draws": len(np.unique(case.groups[train]))},
             **score(
@@ -204,15 +204,15 @@ def _noisy(case: Case) -> list[dict[str, Any]]:
 
 
 def _noisy_references(case: Case) -> Float | None:
-    """Of the records that noise is added to; the healthy ones were recorded without it."""
+    """Healthy features of the records with added noise; they were recorded without it."""
     return None if case.references is None else case.references[case.random[1][:NOISY_RECORDS]]
 
 
-# --- what more training, less wear, less time do --------------------------------------------------
+# --- learning curve, detectability, cost ----------------------------------------------------------
 
 
 def learning_curve(case: Case) -> list[dict[str, Any]]:
-    """Error on the random split's test machines against the number of machines trained on.
+    """Error on the random split's test machines against the number of training machines.
 
     Returns
     -------
@@ -235,22 +235,22 @@ def learning_curve(case: Case) -> list[dict[str, Any]]:
 
 
 def detectability(case: Case, *, noise: bool = True) -> list[dict[str, Any]]:
-    """Smallest wear found in nine of ten cases at one false alarm in twenty, by noise and speed.
+    """Smallest wear detected in 9 of 10 cases at one false alarm in 20, by noise and speed.
 
-    The threshold is set on the estimates of the healthy records of the same condition: the tenth
-    of the judged records with the least wear.
+    The threshold is set on the estimates of the healthy records of the same condition, the tenth of
+    the judged records with the least wear.
 
     Parameters
     ----------
     case : Case
     noise : bool
-        Whether to add noise, too; else by speed alone.
+        Whether to include added noise; otherwise by speed alone.
 
     Returns
     -------
     list of dict
         ``condition``, ``records``, ``healthy_below_m``, ``threshold_m``, ``smallest_m`` and
-        ``smallest_share_of_limit`` with intervals; None where no wear is found so often.
+        ``smallest_share_of_limit`` with intervals; None if no wear is detected so often.
     """
     test = case.random[1]
     found, truth = _estimates(case, case.table, test, case.references), case.truth[test]
@@ -278,9 +278,9 @@ def _floors_by_speed(case: Case, test: Index, truth: Float, found: Float) -> lis
     edges = np.quantile(speed, [0, 1 / 3, 2 / 3, 1])
     floors = []
     for low, high in pairwise(edges.tolist()):
-        here = (speed >= low) & (speed <= high)
+        part = (speed >= low) & (speed <= high)
         words = f"speed {low:.3g} to {high:.3g} Hz"
-        floors.append(_floor(case, words, truth[here], found[here], case.groups[test][here]))
+        floors.append(_floor(case, words, truth[part], found[part], case.groups[test][part]))
     return floors
 
 
@@ -308,14 +308,14 @@ def _floor(
 
 
 def costs(case: Case) -> list[dict[str, Any]]:
-    """Milliseconds from a recording to its wear, one recording after another.
+    """Time from a recording to its wear, for single recordings [ms].
 
     Returns
     -------
     list of dict
-        ``name``, ``ms_per_record`` (the least of some, which a busy computer disturbs least) or
-        ``missing``. Features and the severity from them, ours and the baselines'; and all that an
-        estimate of ours has: quality, familiarity, interval, set and evidence, too.
+        ``name``, ``ms_per_record`` (shortest of several, which is least affected by load) or
+        ``missing``. Features and severity, of the model and the baselines; also the whole estimate
+        of the model, with quality, familiarity, interval, set and evidence.
     """
     recordings = list(case.recordings(case.random[1][:_TIMED_RECORDS]))
     return [
@@ -341,7 +341,7 @@ def _whole_ms(case: Case, recordings: Sequence[Recording]) -> float:
     return _ms(lambda recording: case.model.estimate(recording, healthy), recordings)
 
 
-def _cost(case: Case, rival: Rival, recordings: Sequence[Recording]) -> dict[str, Any]:
+def _cost(case: Case, rival: BaselineMethod, recordings: Sequence[Recording]) -> dict[str, Any]:
     train = case.random_side
     features = train.features.get(rival.source, absence(rival.source) or LEFT_OUT)
     if isinstance(features, str) or rival.source not in case.transforms:

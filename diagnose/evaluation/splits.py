@@ -1,4 +1,4 @@
-"""Judge a way of training where it was never trained: held-out machines, conditions, noise."""
+"""Splits to evaluate a training method: held-out machines, held-out conditions, added noise."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,57 +36,57 @@ Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 Fit = Callable[[Index], WearModel]
-"""Training rows -> a model that has seen no other row."""
+"""Training rows -> a model trained on these rows only."""
 
 Cut = Callable[["Case"], tuple[Index, Index]]
-"""Case -> rows of its table to train on, and to judge on."""
+"""Case -> rows of its table for training and for judging."""
 
 Say = Callable[[str], None]
 
 TEST_SHARE = 0.25
-"""Of the machines, in the random split."""
+"""Share of the machines held out in the random split."""
 
 HELD_SHARE = 0.2
-"""Of the records, where a condition is held out."""
+"""Share of the records held out by a condition."""
 
 NOISE_DB = (-20.0, -10.0, 0.0)
 """Rms of added white noise over the as-new rms of each channel [dB]."""
 
 NOISY_RECORDS = 200
-"""Of the random split's test side, at each level of noise: machines enough for intervals."""
+"""Test records of the random split at each noise level: enough machines for intervals."""
 
 HEALTHY_SHARE = 0.1
-"""Of the records, those with the least wear, count as new: they must raise no alarm."""
+"""Share of the records, those with the least wear, that count as healthy."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A data set with its features, and a way of training.
+    """A data set with its features, and a training method.
 
     Attributes
     ----------
     path : Path
     table : FeatureTable
-        Of all usable records.
+        Features of all usable records.
     head : Attributes
     severity : str
-        Column that is judged.
+        Judged severity column.
     edges, limit : tuple of float, float
         Grade edges and condemning limit [m].
     choice : Choice
         Features that the table holds.
     healthy : Healthy or None
-        What they are told against.
+        Healthy reference of the features.
     fit : callable
         Rows -> model.
     references : numpy.ndarray [shape=(n_records, n_features)] or None
-        Healthy row of each record's machine, where the model is referenced.
+        Healthy row of each record's machine, if the model is referenced.
     seed : int
-        Of splits, noise and resamples.
+        Seed of splits, noise and resamples.
     foreign : mapping
-        Source -> features of all rows of the table by a package of others, or why there are none.
+        Source -> third-party features of all rows of the table, or the reason for their absence.
     transforms : mapping
-        Source -> the same of further recordings, where there are any.
+        Source -> transform that computes such features for further recordings.
     """
 
     path: Path
@@ -119,7 +119,7 @@ class Case:
         return group_split(self.groups, test_fraction=TEST_SHARE, seed=self.seed)
 
     def side(self, rows: Index) -> Side:
-        """Rows of the table, to train or judge baselines on."""
+        """Rows of the table as a side to train or judge baselines."""
         return side_of(self.table, self.severity, rows, self.foreign)
 
     @cached_property
@@ -129,27 +129,27 @@ class Case:
 
     @cached_property
     def model(self) -> WearModel:
-        """Trained on the random split."""
+        """Model trained on the random split."""
         return self.fit(self.random[0])
 
     @cached_property
     def stored(self) -> tuple[str, ...]:
-        """Splits that the file holds under names of their own."""
+        """Names of the splits stored in the file."""
         with DataSet(self.path) as data:
             return tuple(name for name in data.splits if name not in ALL_SPLITS)
 
     @cached_property
     def noisy(self) -> dict[float, tuple[FeatureTable, dict[str, Float | str]]]:
-        """Of each level of noise [dB], as :func:`noisy_table`."""
+        """Noise level [dB] -> result of :func:`noisy_table`."""
         return {level: noisy_table(self, level) for level in NOISE_DB}
 
     def row(self, recording: Recording) -> Float:
-        """Features of a recording, as the table holds them."""
+        """Features of a recording, as in the table."""
         known = None if self.healthy is None else self.healthy.of(recording.machine)
         return recording_features(recording, held_against(self.choice, known))[1]
 
     def recordings(self, rows: Index) -> Iterator[Recording]:
-        """Recordings of rows of the table, one in memory at a time."""
+        """Recordings of rows of the table, with one in memory at a time."""
         return recordings_of(self.path, rows)
 
 
@@ -164,22 +164,22 @@ def case_of(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Case:
-    """A data set, to be trained on and judged as a model was trained, but on other splits.
+    """Data set for training and evaluation with the settings of a model, on other splits.
 
     Parameters
     ----------
     model : WearModel
-        Its severity, its budget and its mode are used; it is not judged.
+        Its severity, budget and mode are used; it is not evaluated itself.
     path : str or Path
         Labelled data set.
     healthy : str or Path, optional
         Healthy records of the same machines; a referenced model needs them.
     quick : bool
-        Leave out the baselines that need packages of others.
+        Leave out the baselines that need third-party packages.
     cache : Path, optional
-        Folder in which features of such packages are kept.
+        Folder in which features of these packages are kept.
     seed : int
-        Of splits, folds, noise and resamples.
+        Seed of splits, folds, noise and resamples.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -192,7 +192,7 @@ def case_of(
     Raises
     ------
     DataError
-        The severity is not labelled, or healthy records are missing or without use.
+        The severity is not labelled, or healthy records are missing or superfluous.
     """
     card = model.card
     with DataSet(path) as data:
@@ -259,7 +259,7 @@ def _fast(case: Case) -> tuple[Index, Index]:
 def _loaded(case: Case) -> tuple[Index, Index]:
     known = [column for column in LOADS if column in case.table.manifest]
     if not known:
-        raise DataError(f"it has no column of load ({', '.join(LOADS)})")
+        raise DataError(f"it has no load column ({', '.join(LOADS)})")
     return _highest(case, case.table.manifest[known[0]].to_numpy(dtype=float))
 
 
@@ -287,29 +287,29 @@ SPLITS: dict[str, tuple[str, Cut]] = {
     "random": ("a quarter of the machines, at random", _random),
     "speed": ("the fastest fifth of the records", _fast),
     "load": ("the most loaded fifth of the records", _loaded),
-    "severity-gap": ("all of the grade below condemned: wear between what was trained", _gap),
-    "severity-beyond": ("all that is condemned: more wear than any trained", _beyond),
-    "geometry": ("the fifth of the machines whose drawn properties are the farthest out", _unusual),
+    "severity-gap": ("the grade below condemned: wear between the trained values", _gap),
+    "severity-beyond": ("condemned: more wear than in the training", _beyond),
+    "geometry": ("the fifth of the machines with the most extreme drawn properties", _unusual),
 }
-"""Name -> what is held out, and the rows of both sides. A new split is one row."""
+"""Name -> description of the held-out part, and rows of both sides. A new split is one row."""
 
 NOISE = "noise"
 ALL_SPLITS = (*SPLITS, NOISE)
 
 
 def machine_distances(drawn: Drawn) -> dict[int, float]:
-    """How far out the drawn properties of each machine lie, drawn again from the recipe.
+    """Extremeness of the drawn properties of each machine, drawn again from the recipe.
 
     Parameters
     ----------
     drawn : Drawn
-        Of a generated set; see :func:`wearstate.datasets.split.stored.drawn_of`.
+        Draws of a generated set; see :func:`wearstate.datasets.split.stored.drawn_of`.
 
     Returns
     -------
     dict
-        Group -> root mean square over all properties of their place between the least (-1) and the
-        largest (1) drawn; of a property of many components, of their root mean square.
+        Group -> rms over all properties of their position between the smallest (-1) and the largest
+        (1) drawn; a property with many components counts with the rms of these.
 
     Raises
     ------
@@ -317,7 +317,7 @@ def machine_distances(drawn: Drawn) -> dict[int, float]:
         The data set has no recipe, or draws other machines with it.
     """
     if drawn.recipe is None:
-        raise DataError("it has no recipe to draw its machines from again")
+        raise DataError("it has no recipe to draw its machines again")
     paths = sorted({axis.path for axis in drawn.recipe.machine})
     machines = {sample.group: sample.drawn for sample in machine_samples(drawn)}
     squares = [_squared_places([each[path] for each in machines.values()]) for path in paths]
@@ -325,7 +325,7 @@ def machine_distances(drawn: Drawn) -> dict[int, float]:
 
 
 def _squared_places(values: Sequence[float | Mapping[str, float]]) -> Float:
-    """Of one property, drawn for each machine; a mapping has many components."""
+    """Squared positions of one property of each machine; a mapping has many components."""
     rows = [list(each.values()) if isinstance(each, Mapping) else [each] for each in values]
     table = np.array(rows, dtype=float)
     low, high = table.min(axis=0), table.max(axis=0)
@@ -337,7 +337,7 @@ def _squared_places(values: Sequence[float | Mapping[str, float]]) -> Float:
 
 
 def noisy_table(case: Case, level: float) -> tuple[FeatureTable, dict[str, Float | str]]:
-    """Features of test records of the random split with white noise added.
+    """Features of test records of the random split with added white noise.
 
     Parameters
     ----------
@@ -348,9 +348,9 @@ def noisy_table(case: Case, level: float) -> tuple[FeatureTable, dict[str, Float
     Returns
     -------
     table : FeatureTable
-        Of up to :data:`NOISY_RECORDS` records.
+        Features of up to :data:`NOISY_RECORDS` records.
     foreign : dict
-        Features by the packages of others.
+        Features by third-party packages.
     """
     rows = case.random[1][:NOISY_RECORDS]
     deviation = 10 ** (level / 20) * _as_new_rms(case)
@@ -382,7 +382,7 @@ def _as_new_rms(case: Case) -> Float:
 
 
 def with_noise(recording: Recording, deviation: Float, *, seed: Any) -> Recording:
-    """A recording with white noise added to its vibration channels.
+    """Add white noise to the vibration channels of a recording.
 
     Parameters
     ----------
@@ -390,12 +390,12 @@ def with_noise(recording: Recording, deviation: Float, *, seed: Any) -> Recordin
     deviation : numpy.ndarray [shape=(n_vibration_channels,)]
         Standard deviation of the noise [unit of each channel].
     seed : int or sequence of int
-        Of the noise.
+        Seed of the noise.
 
     Returns
     -------
     Recording
-        Its tacho is as it was.
+        The tacho is unchanged.
     """
     signal = recording.signal.astype(np.float64)
     places = [i for i, channel in enumerate(recording.channels) if channel.name != recording.tacho]

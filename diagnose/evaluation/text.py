@@ -15,16 +15,16 @@ _FEW_RECORDS = 30
 def features_text(
     card: ModelCard, choices: Sequence[FeatureSelection], costs: Sequence[float]
 ) -> list[str]:
-    """Features of a model, what else there was to choose from, and the time of each.
+    """Features of a model, the alternatives, and their computing times.
 
     Parameters
     ----------
     card : ModelCard
-        Of the model.
+        Card of the model.
     choices : sequence of FeatureSelection
-        What it was trained with.
+        Feature selections that the training could choose from.
     costs : sequence of float
-        Time of the features of one recording, of each choice [ms].
+        Time of the features of one recording for each selection [ms].
     """
     mine = choice_in(card.feature_choice)
     tried = {each.name: each for each in card.feature_choice.candidates}
@@ -47,12 +47,12 @@ def features_text(
 
 
 def refusal_lines(card: ModelCard) -> list[str]:
-    """What a model was trained to refuse, as lines for a terminal; none where that is nothing.
+    """Kinds of recording that a model was trained to refuse, as lines for a terminal.
 
     Parameters
     ----------
     card : ModelCard
-        Of the model.
+        Card of the model.
     """
     return [
         f"Refuses {kind_words(rates.name)}: {rates.detection_rate:.1%} of {rates.records}, and "
@@ -62,14 +62,14 @@ def refusal_lines(card: ModelCard) -> list[str]:
 
 
 def score_lines(result: Mapping[str, Any], card: ModelCard) -> list[str]:
-    """A judgement as lines for a terminal.
+    """An evaluation as lines for a terminal.
 
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.evaluate.score`; may be empty.
+        From :func:`wearstate.diagnose.evaluation.evaluate.score`; may be empty.
     card : ModelCard
-        Of the model.
+        Card of the model.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def score_lines(result: Mapping[str, Any], card: ModelCard) -> list[str]:
     if result["records"] < _FEW_RECORDS:
         lines.append("  too few records: every figure below is very uncertain")
     if result["mae_m"] is None:
-        return [*lines, "  none is familiar: no figure can be given for this machine"]
+        return [*lines, "  none is familiar: no error can be given for this machine"]
     return [
         *lines,
         f"  {severity_word(card.severity)} error".ljust(20)
@@ -127,7 +127,7 @@ def _percent(result: Mapping[str, Any], name: str) -> str:
 
 def _rate(result: Mapping[str, Any], name: str) -> str:
     if result[name] is None:
-        return "none to be found: no such machine"
+        return "none: no such machine"
     return _percent(result, name)
 
 
@@ -140,12 +140,12 @@ def _bracketed(
 
 
 def baseline_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Baselines beside a model, as lines for a terminal.
+    """Comparison with baselines, as lines for a terminal.
 
     Parameters
     ----------
     rows : mapping
-        Of :func:`wearstate.diagnose.evaluation.baselines.contest`, as JSON has it.
+        From :func:`wearstate.diagnose.evaluation.baselines.compare_baselines`, as in JSON.
 
     Examples
     --------
@@ -173,12 +173,12 @@ def _baseline_line(name: str, row: Mapping[str, Any]) -> str:
 
 
 def splits_text(result: Mapping[str, Any]) -> str:
-    """A whole evaluation as text: one line a split, what lies behind it below.
+    """A whole evaluation as text: one line per split, further tables below.
 
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
+        From :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
     """
     origin = "simulated" if result["origin"] == "simulated" else "measured"
     head = (
@@ -200,7 +200,7 @@ def splits_text(result: Mapping[str, Any]) -> str:
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    # a row that ends early says why, and widens no column
+    # a row that ends early gives a reason, and must not widen a column
     full = [head, *(row for row in rows if len(row) == len(head))]
     widths = [max(len(row[i]) for row in full) for i in range(len(head))]
     return [
@@ -267,7 +267,7 @@ def _best_words(name: str, row: Mapping[str, Any]) -> str:
 
 
 def best_baseline(split: Mapping[str, Any]) -> str | None:
-    """Name of the baseline with the least mean error over all records; None where none ran.
+    """Name of the baseline with the smallest mean error over all records; None if none ran.
 
     Examples
     --------
@@ -311,7 +311,7 @@ def _floor_row(row: Mapping[str, Any]) -> list[str]:
 
 
 def _open_ended(figure: Mapping[str, Any], times: float, digits: int) -> str:
-    """A figure whose upper end may be beyond all that was judged."""
+    """A figure whose ends may be beyond the judged range."""
     high = "beyond" if figure["high"] is None else f"{times * figure['high']:.{digits}f}"
     low = "beyond" if figure["low"] is None else f"{times * figure['low']:.{digits}f}"
     return f"{times * figure['value']:.{digits}f} [{low}, {high}]"
@@ -326,12 +326,12 @@ def _cost_row(row: Mapping[str, Any]) -> list[str]:
 
 
 def part_lines(what: str, rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Errors of parts of the records as lines for a terminal; none where there are no parts.
+    """Errors of parts of the records as lines for a terminal; none without parts.
 
     Parameters
     ----------
     what : str
-        Head of the first column.
+        Heading of the first column.
     rows : mapping
         From :func:`by_confounder` or :func:`by_choice`.
 
