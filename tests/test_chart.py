@@ -122,7 +122,7 @@ def study_of(*candidates, level=None, status="resolved", raises=()):
         raised=answer_of(HERE_POINT, *candidates, level=level, status=so_far),
         raises=raises,
         refused=("film = finite: knows no feed",),
-        pruned=("mesh = x4: a cheaper one errs no more",),
+        pruned=("mesh = x4: a cheaper one has no larger error",),
         measured=5,
         planned=9 if status == "out of budget" else 5,
         status=status,
@@ -770,7 +770,7 @@ def test_text_and_json_tell_the_same(chart):
         *chart.conclusion,
         "mesh x2, x1, x1/2: peak film force moves by 0.40% then 0.10%, order 2.00, 0.03% left",
         "film: link, mesh 144 around and 33 along: a link is in tension",
-        "mesh = x4: a cheaper one errs no more",
+        "mesh = x4: a cheaper one has no larger error",
         "film = finite: knows no feed",
     ):
         assert words in text
@@ -967,7 +967,7 @@ def test_an_interrupted_chart_goes_on_to_the_same_page(
     monkeypatch.setattr(
         "wearstate.diagnose.charts.of_scene.time.perf_counter", lambda: 1e-9 * next(ticks)
     )
-    monkeypatch.setattr("wearstate.sim.fidelity.study._DEAR", dear)
+    monkeypatch.setattr("wearstate.sim.fidelity.study._EXPENSIVE", dear)
     (tmp_path / "pages").mkdir()
     whole, page = (tmp_path / "pages" / f"{kind}.csv" for kind in ("whole", "page"))
     subject = few_rungs(name, tmp_path, *pinned)
@@ -1073,7 +1073,7 @@ def test_a_pump_with_pipes_has_an_answer_at_any_budget():
     search = scene_search(pump)
     for looks in (0, 20):  # the same search goes on
         search.measure(late_after(looks))
-        chart = chart_of(pump, search.found())
+        chart = chart_of(pump, search.result())
         assert chart.unfinished
         error = r"[\d.]+ (± [\d.]+ )?%( \(2 starts\))?"
         assert re.search(rf"written is .*: {error} off in", chart.conclusion[0])
@@ -1096,7 +1096,7 @@ def test_runs_of_a_dear_pump_are_cut_and_starts_are_more(monkeypatch):
     assert search.duration * speed == pytest.approx(4)
     whole = triplex.duration * speed + settling
     assert search.share == pytest.approx((4 + settling) / whole)
-    monkeypatch.setattr("wearstate.sim.fidelity.study._DEAR", 1e9)
+    monkeypatch.setattr("wearstate.sim.fidelity.study._EXPENSIVE", 1e9)
     uncut = scene_search(triplex)
     assert (uncut.duration, uncut.share, uncut.pilot.common) == (None, 1.0, {})
     assert 1 <= search.kept.starts * search.share / uncut.kept.starts < 2

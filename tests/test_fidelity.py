@@ -19,7 +19,7 @@ from wearstate.sim.fidelity.differences import (
     Candidate,
     Difference,
     differences,
-    starts_to_tell,
+    starts_to_decide,
     surely_within,
 )
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
@@ -190,8 +190,8 @@ def test_errors_are_against_the_next_rung_where_the_best_one_does_not_hold():
     found = chosen(KnownPilot({}, faults=[("drive.rung", "motor")]), 0.02)
     assert found.rungs["drive"] == "constant-speed"
     assert any(
-        reason.startswith("drive = motor: does not hold on this machine, ")
-        and reason.endswith("out of its validity; errors are against drive = constant-speed")
+        reason.startswith("drive = motor: fails on this machine, ")
+        and reason.endswith("out of its validity; errors are relative to drive = constant-speed")
         for reason in found.reasons
     )
 
@@ -277,7 +277,7 @@ def test_differences_are_taken_start_by_start():
 def study(scene, quantities, *, late=None, **options):
     search = Search(scene, quantities, **options)
     search.measure(late)
-    return search.found()
+    return search.result()
 
 
 def test_a_study_shows_the_order_of_convergence_and_what_is_left():
@@ -456,11 +456,11 @@ def test_the_cheapest_information_comes_first():
     """Numerics of the scene as written, then one rung at a time, then the best rungs."""
     told = []
     pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3, IDEAL_GUIDE: 0.001})
-    search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, tell=told.append)
+    search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, report=told.append)
     search.measure()
     first = list(dict.fromkeys(told))
     assert first[:2] == ["the scene as written", "numerics of the scene as written"]
-    singles = [i for i, what in enumerate(first) if what.startswith("what the rung of")]
+    singles = [i for i, what in enumerate(first) if what.startswith("error of the rung of")]
     assert singles == list(range(2, 2 + len(singles)))
     assert first[2 + len(singles)] == "the scene as written against the best rungs"
 
@@ -535,7 +535,7 @@ def test_a_rung_that_does_not_hold_leaves_the_next_below_as_the_reference(faults
     assert found.status == found.raised.status == "resolved"
     assert found.raised.reference.rungs["wristpin"] == best
     assert found.raised.chosen.rungs["pressure"] == "chamber"
-    dropped = [text for text in found.refused if "does not hold on this machine" in text]
+    dropped = [text for text in found.refused if "fails on this machine" in text]
     assert len(dropped) == len(faults)
     assert all("out of its validity" in text for text in dropped)
     raised = {each.effect: each.best for each in found.raises}
@@ -559,7 +559,7 @@ def test_rungs_that_do_not_hold_together_give_way_one_at_a_time(first):
         ("two-level", "motor"),
         ("chamber", "constant-speed"),
     )
-    [text] = [text for text in found.refused if "does not hold on this machine" in text]
+    [text] = [text for text in found.refused if "fails on this machine" in text]
     assert "with the other best rungs" in text
 
 
@@ -627,7 +627,7 @@ def test_the_best_rungs_with_the_numerics_as_written_are_known_as_soon_as_the_be
     pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3}, scatter=0.1)
     search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
     told = []
-    search.tell = lambda what: told.append((what, search.found().raised))
+    search.report = lambda what: told.append((what, search.result().raised))
     search.measure(late_after(60))
     own = next(found for _, found in told if found is not None and len(found.candidates) > 2)
     assert own.status == "so far"
@@ -669,11 +669,11 @@ def test_what_a_cut_search_still_takes_is_foretold(runs):
     search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
     search.measure(late_after(runs))
     foretold, spent = search.remaining(), pilot.cost
-    assert search.found().status == "out of budget"
+    assert search.result().status == "out of budget"
     search.measure()
     assert 1 / 2 < foretold / (pilot.cost - spent) < 2
     assert search.remaining() == 0.0
-    assert search.found().seconds_left == 0.0
+    assert search.result().seconds_left == 0.0
 
 
 def test_the_sure_bound_is_that_of_students_distribution():
@@ -703,7 +703,7 @@ def test_the_sure_bound_is_wider_for_the_worst_of_many():
     assert_allclose(bounds, [0.01 + 0.002 * 2.5706, 0.01 + 0.002 * 5.1645], rtol=1e-3)
 
 
-def test_starts_to_tell_go_with_the_square_of_scatter_and_of_what_is_left_of_the_accuracy():
+def test_starts_to_decide_go_with_the_square_of_scatter_and_of_what_is_left_of_the_accuracy():
     """Of 32 starts a standard error of 1 may be 1.22, which asks for twice the starts."""
     for error, scatter, starts in (
         (0.0, 0.3, 32), (0.0, 0.9, 64), (0.0, 2.0, 256),
@@ -711,7 +711,7 @@ def test_starts_to_tell_go_with_the_square_of_scatter_and_of_what_is_left_of_the
     ):  # fmt: skip
         apart = {"one": Difference(mean=error / 100, standard_error=scatter / 100)}
         found = Candidate(rungs={}, values={}, cost=1.0, differences=apart, starts=32)
-        assert starts_to_tell(found, 0.03) == starts, (error, scatter)
+        assert starts_to_decide(found, 0.03) == starts, (error, scatter)
 
 
 @pytest.mark.parametrize(("scatter", "step_error"), [(0.002, 0.05), (0.005, 0.05), (0.01, 0.005)])
@@ -783,7 +783,7 @@ def cut_search(slow, late=None):
 
 
 def test_what_would_be_chosen_on_cut_recordings_is_confirmed_on_whole_ones():
-    asked = [cut_search(slow).found() for slow in (("", ""), IDEAL_WRIST)]
+    asked = [cut_search(slow).result() for slow in (("", ""), IDEAL_WRIST)]
     alike, slow = [found.raised.chosen.rungs["wristpin"] for found in asked]
     assert alike == "ideal"
     assert slow != "ideal"
@@ -796,7 +796,7 @@ def test_what_would_be_chosen_on_cut_recordings_is_confirmed_on_whole_ones():
 
 
 def test_a_reference_that_fails_on_whole_recordings_is_told_and_no_choice_is_final():
-    found = cut_search(None).found()
+    found = cut_search(None).result()
     assert (found.kept.status, found.raised.status) == ("so far", "so far")
     assert any("whole recordings" in text and "after 3 s" in text for text in found.refused)
 
@@ -804,14 +804,14 @@ def test_a_reference_that_fails_on_whole_recordings_is_told_and_no_choice_is_fin
 def test_what_is_not_confirmed_on_whole_recordings_is_not_called_final():
     before = cut_search(IDEAL_WRIST, lambda _expected: LastingPilot.whole > 0)
     assert LastingPilot.whole == 1
-    found = before.found()
+    found = before.result()
     assert (found.status, found.kept.status) == ("out of budget", "so far")
     assert before.remaining() > 0
     told, known = before.progress()
     assert told < known
     before.measure()
     assert before.remaining() == 0
-    assert before.found().raised.chosen.rungs["wristpin"] != "ideal"
+    assert before.result().raised.chosen.rungs["wristpin"] != "ideal"
 
 
 @pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 150])
@@ -1051,10 +1051,10 @@ def test_a_best_rung_that_does_not_hold_on_a_machine_is_left_out_with_its_reason
     """A massless link transmits no tension, and the rods of this pump are pulled now and then."""
     found = on_two_throws()
     assert found.rungs["wristpin"] == "ideal"
-    told = [reason for reason in found.reasons if "does not hold" in reason]
+    told = [reason for reason in found.reasons if "fails on this machine" in reason]
     assert len(told) == 1
-    assert told[0].startswith("wristpin = link: does not hold on this machine, tension_share")
-    assert told[0].endswith("errors are against wristpin = ideal")
+    assert told[0].startswith("wristpin = link: fails on this machine, tension_share")
+    assert told[0].endswith("errors are relative to wristpin = ideal")
 
 
 def test_a_rung_that_the_scene_is_written_with_is_never_left_out():

@@ -19,7 +19,7 @@ from wearstate.sim.casing.decimation import edge_samples
 from wearstate.sim.casing.measured_casing import MeasuredCasing
 from wearstate.sim.casing.modes import CasingModes, ModalCasing
 from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.parts.casing import FrfFile, beside
+from wearstate.sim.parts.casing import FrfFile, with_folder
 from wearstate.sim.scene.load import load_scene, scene_from_table, scene_table, scene_text
 from wearstate.sim.scene.scene import SceneError
 
@@ -617,12 +617,12 @@ def test_exactly_one_of_modes_and_frf():
 def test_a_scene_with_a_table_is_frozen_and_its_dump_names_no_folder(tmp_path):
     frf = {"file": "pump.csv", "pairs": {"acc_x/guide_y_1": "12:+X/3:+Y"}}
     table = {**scene_table(scene_text("bilge-pump")), "casing": {"frf": frf}}
-    scene = scene_from_table(beside(table, tmp_path))
+    scene = scene_from_table(with_folder(table, tmp_path))
     assert scene.casing.frf.folder == str(tmp_path)
     assert hash(scene) == hash(pickle.loads(pickle.dumps(scene)))
     assert pickle.loads(pickle.dumps(scene)) == scene  # a worker finds the file too
     assert str(tmp_path) not in scene.model_dump_json()
-    assert beside({"name": "x"}, tmp_path) == {"name": "x"}
+    assert with_folder({"name": "x"}, tmp_path) == {"name": "x"}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...sim.parts.casing import beside as files_beside
+from ...sim.parts.casing import with_folder
 from ...sim.scene.load import (
     MACHINES,
     all_wear_places,
@@ -100,7 +100,7 @@ def load_recipe(
         table = validate_table(RecipeTable, source.table, str(name_or_path))
         place = beside(source.folder, table.scene) if scene is None else scene
         text = scene_text(place)
-        base = dict(files_beside(scene_table(text, str(place)), scene_folder(place)))
+        base = dict(with_folder(scene_table(text, str(place)), scene_folder(place)))
     except SceneError as error:
         raise RecipeError(str(name_or_path), error.faults) from None
     faults = [*source.foreign, *machine_faults(table, source.machines_folder)]

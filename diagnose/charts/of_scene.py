@@ -178,7 +178,7 @@ def scene_chart(
     """
     search = scene_search(scene, accuracy=accuracy, jobs=jobs)
     measure(search, budget=budget)
-    return chart_of(scene, search.found())
+    return chart_of(scene, search.result())
 
 
 def chart_of(scene: Scene, found: Study) -> Chart:

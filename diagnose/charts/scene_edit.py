@@ -8,7 +8,7 @@ from typing import Any
 from ...datasets.draws.draws import value_at
 from ...datasets.recipe.text import toml_text
 from ...sim.atomic import write_whole
-from ...sim.parts.casing import beside
+from ...sim.parts.casing import with_folder
 from ...sim.scene.load import scene_from_table, scene_table, scene_text
 from ...sim.scene.rungs import with_values
 from ...sim.scene.scene import Scene, SceneError
@@ -248,7 +248,7 @@ def apply_changes(
         text = f"# {note}\n{text}"
     target = with_values(scene, wanted)
     try:
-        found = scene_from_table(beside(scene_table(text, str(path)), path.parent))
+        found = scene_from_table(with_folder(scene_table(text, str(path)), path.parent))
         same = all(_same(found, target, each) for each in (*given, *wanted))
     except SceneError as error:
         raise SceneError(

@@ -4,7 +4,7 @@ import math
 from typing import cast
 
 from ...datasets.generation.quantities import quantity_label
-from ...sim.fidelity.differences import Candidate, starts_to_tell, surely_within
+from ...sim.fidelity.differences import Candidate, starts_to_decide, surely_within
 from ...sim.fidelity.findings import Answer, Study
 from ...sim.scene.scene import Scene
 from .chart import remaining_error
@@ -279,7 +279,7 @@ def _likelihood(scene: Scene, found: Study, answer: Answer) -> str:
     chosen = answer.chosen
     looks, _, may = _named(found, answer)
     word = looks if chosen.error <= found.accuracy else may
-    most, needed = surely_within(chosen), starts_to_tell(chosen, found.accuracy)
+    most, needed = surely_within(chosen), starts_to_decide(chosen, found.accuracy)
     known = f"only an error under {percent(most)}" if most < 1 else "nothing"
     text = f"{word} enough, but after {chosen.starts} starts {known} is certain (at 95 %)"
     if needed > chosen.starts:

@@ -94,7 +94,7 @@ def scene_chart_command(
         interrupted = True
     finally:
         kept.save()
-    found = chart_of(scene, search.found())
+    found = chart_of(scene, search.result())
     if output is not None:
         from ..charts.page import save_chart
 
@@ -207,7 +207,7 @@ def _apply(
 def _watched(search: Search, scene: Scene, jobs: int, budget: float) -> Iterator[None]:
     """What is known, on stderr as soon as it is; a bar with the time left on a terminal."""
     with time_bar() as show:
-        search.tell = _Teller(search, scene, jobs, budget, show)
+        search.report = _Teller(search, scene, jobs, budget, show)
         yield
 
 
@@ -239,7 +239,7 @@ class _Teller:
         """The scene against its own numerics, then against the best rungs; each once."""
         if self.answers == _ANSWERS or self.search.progress(at_all=True)[0] == 0:
             return
-        found = self.search.found()
+        found = self.search.result()
         if self.answers == 0 or found.raised is not None:
             self.answers = _ANSWERS if found.raised is not None else 1
             click.echo(f"after {gone:.0f} s: {where_it_stands(self.scene, found)}", err=True)

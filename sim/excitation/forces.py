@@ -1,7 +1,7 @@
-"""Forces of shakers and hammers, sample by sample.
+"""Force signals of shakers and hammers.
 
 All are drawn from the seed of the recording. A hammer's pulse is a half sine of the contact time
-tau: its spectrum ``cos(pi f tau) / (1 - (2 f tau)^2)`` has fallen by 3 dB at ``0.59 / tau`` and is
+tau: its spectrum ``cos(pi f tau) / (1 - (2 f tau)^2)`` is 3 dB lower at ``0.59 / tau`` and
 zero at ``1.5 / tau``.
 """
 
@@ -20,28 +20,28 @@ from ..scene.exciters import Exciter, PlacedExciter
 Float = NDArray[np.float64]
 
 RISE_SHARE = 0.05
-"""Of a burst or sweep, in which it comes and in which it goes."""
+"""Share of a burst or sweep in which it fades in, and in which it fades out."""
 
-_BLOW_FROM, _BLOW_TO = 0.05, 0.2  # of the time for a blow: nobody hits to the clock
-_REBOUND_AFTER = (0.01, 0.05)  # s, of the second of a double hit (estimate)
-_REBOUND_PEAK = (0.1, 0.5)  # of the first (estimate)
+_BLOW_FROM, _BLOW_TO = 0.05, 0.2  # of the time per blow: nobody hits exactly in time
+_REBOUND_AFTER = (0.01, 0.05)  # s, delay of the second hit of a double hit (estimate)
+_REBOUND_PEAK = (0.1, 0.5)  # of the first peak (estimate)
 _STREAM = 2  # of the seed: 0 is the machine's own, 1 the sensors'
-_FADE = 64  # samples in which a steady force comes and goes: a jump would ring
+_FADE = 64  # samples over which a steady force is faded in and out, as a jump would ring
 
 
 class Push(NamedTuple):
-    """What an exciter does to the machine, each [shape=(n_samples,)].
+    """Force of an exciter on the machine, each [shape=(n_samples,)].
 
     Attributes
     ----------
     cell : ndarray
-        Along the axis of the force cell, which reads this [N].
+        Along the axis of the force cell, which measures it [N].
     along : ndarray
         In the nominal direction [N].
     across : ndarray
-        At right angles to it: blows that are not quite straight [N].
+        Perpendicular to it, from blows that are not quite straight [N].
     moment : ndarray
-        Of blows beside their place, about an axis across both shaft and push [N m].
+        From blows next to their place, about an axis across both shaft and force [N m].
     """
 
     cell: Float
@@ -60,29 +60,29 @@ def exciter_push(
     lead: int = 0,
     tail: int = 0,
 ) -> Push:
-    """Force of an exciter through a recording.
+    """Force of an exciter during a recording.
 
     Parameters
     ----------
     part : Exciter
     n_samples : int
-        Of the recording.
+        Samples of the recording.
     sample_rate : float
-        [Hz]
+        Sampling rate [Hz].
     seed : int
-        Of the recording.
+        Seed of the recording.
     index : int
-        Of the exciter in its scene; others are independent of it.
+        Index of the exciter in its scene; exciters are independent.
     lead : int
-        Samples before the recording in which a steady force, a random one or a stepped sine, is
-        already there; bursts, sweeps and blows are not.
+        Samples before the recording in which a steady force (random or stepped sine) already
+        acts; bursts, sweeps and blows do not.
     tail : int
-        Samples after the recording in which a steady force fades away.
+        Samples after the recording in which a steady force is faded out.
 
     Returns
     -------
     Push
-        Of ``lead + n_samples + tail`` samples.
+        Force of ``lead + n_samples + tail`` samples.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def exciter_push(
 
 
 class _Span(NamedTuple):
-    """Samples of a force: before the recording, in it, and after it."""
+    """Samples of a force: before, in and after the recording."""
 
     before: int
     inside: int
@@ -129,7 +129,7 @@ def _straight(force: Float) -> Push:
 
 
 def _random(part: Exciter, span: _Span, sample_rate: float, rng: np.random.Generator) -> Push:
-    """Gaussian, flat over the band, a quarter longer than it is used and so not periodic."""
+    """Gaussian, flat over the band, drawn a quarter longer than used and so not periodic."""
     n = sum(span)
     size = n + n // 4 + 1
     noise = band_noise(size, sample_rate, part.low, part.high, rng)
@@ -139,20 +139,20 @@ def _random(part: Exciter, span: _Span, sample_rate: float, rng: np.random.Gener
 def band_noise(
     n: int, sample_rate: float, low: float, high: float, rng: np.random.Generator
 ) -> Float:
-    """Gaussian noise of unit rms, flat between two frequencies and nothing outside.
+    """Gaussian noise of unit rms, flat between two frequencies and zero outside.
 
     Parameters
     ----------
     n : int
-        Samples, after which it repeats.
+        Number of samples, its period.
     sample_rate, low, high : float
-        [Hz]
+        Sampling rate and band [Hz].
     rng : numpy.random.Generator
 
     Returns
     -------
     ndarray, shape (n,)
-        The rms of all of it is one in the mean over many.
+        Noise; its mean square is one on average over realisations.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def _burst_random(part: Exciter, span: _Span, sample_rate: float, rng: np.random
 
 
 def _ends(part: Exciter) -> tuple[float, float]:
-    """A little more than the band, so that all of it is pushed."""
+    """Slightly more than the band, to excite all of it."""
     return 0.8 * part.low, 1.05 * part.high
 
 
@@ -196,14 +196,14 @@ def _sweep(part: Exciter, span: _Span, sample_rate: float, rng: np.random.Genera
 
 
 def sweep_wave(n: int, sample_rate: float, low: float, high: float) -> Float:
-    """A linear sweep through a band; it comes at the lowest frequency and goes at the highest.
+    """A linear sweep through a band, faded in at the lowest and out at the highest frequency.
 
     Parameters
     ----------
     n : int
-        Samples.
+        Number of samples.
     sample_rate, low, high : float
-        [Hz]
+        Sampling rate and band [Hz].
 
     Returns
     -------
@@ -220,7 +220,7 @@ def sweep_wave(n: int, sample_rate: float, low: float, high: float) -> Float:
 
 
 def _repeated(part: Exciter, n: int, wave: Callable[[int], Float]) -> Float:
-    """Bursts of the exciter's rms, one after the other, each coming and going softly."""
+    """Bursts with the exciter's rms, one after the other, each faded in and out."""
     force = np.zeros(n)
     starts = np.linspace(0, n, part.repeats + 1).astype(int)
     for start, stop in pairwise(starts):
@@ -231,7 +231,7 @@ def _repeated(part: Exciter, n: int, wave: Callable[[int], Float]) -> Float:
 
 
 def burst_gate(n: int) -> Float:
-    """One with half a cosine at either end, over :data:`RISE_SHARE` of it.
+    """One, with half a cosine at either end over :data:`RISE_SHARE` of it.
 
     Examples
     --------
@@ -243,7 +243,7 @@ def burst_gate(n: int) -> Float:
 
 
 def _stepped_sine(part: Exciter, span: _Span, sample_rate: float, rng: np.random.Generator) -> Push:
-    """One frequency after the other, without a jump; the first is there before the recording."""
+    """One frequency after the other without jumps; the first starts before the recording."""
     del rng
     hertz = stepped_frequencies(part, span.inside / sample_rate)
     edges = np.linspace(0, span.inside, hertz.size + 1).astype(int)
@@ -253,18 +253,18 @@ def _stepped_sine(part: Exciter, span: _Span, sample_rate: float, rng: np.random
 
 
 def stepped_frequencies(part: Exciter, duration: float) -> Float:
-    """Frequencies of a stepped sine, evenly spread, whole periods in half of a dwell.
+    """Frequencies of a stepped sine, evenly spaced, with whole periods in half of a dwell.
 
     Parameters
     ----------
     part : Exciter
     duration : float
-        Of all dwells together [s].
+        Total of all dwells [s].
 
     Returns
     -------
     ndarray, shape (repeats,)
-        [Hz]
+        Frequencies [Hz].
 
     Examples
     --------
@@ -285,14 +285,14 @@ def _hammer(part: Exciter, span: _Span, sample_rate: float, rng: np.random.Gener
         at = at[at < span.inside]
         pulse = half_sine(at / sample_rate - blow.begin, part.contact_time) * blow.peak
         straight, askew = math.cos(blow.angle), math.sin(blow.angle)
-        shares = (1.0, straight, askew, straight * blow.beside)
+        shares = (1.0, straight, askew, straight * blow.offset)
         for row, share in zip(push, shares, strict=True):
             row[at] += share * pulse
     return push
 
 
 def half_sine(time: Float, contact_time: float) -> Float:
-    """Pulse of unit peak from time zero on.
+    """Pulse of unit peak, starting at time zero.
 
     Examples
     --------
@@ -307,11 +307,11 @@ class _Blow(NamedTuple):
     begin: float  # s
     peak: float  # N
     angle: float  # rad
-    beside: float  # m
+    offset: float  # m
 
 
 def _blows(part: Exciter, duration: float, rng: np.random.Generator) -> list[_Blow]:
-    """Blows with the rebounds of those that hit twice, which are where the first was."""
+    """Blows, with the rebounds of double hits at the place of the first."""
     stretch, count = duration / part.repeats, part.repeats
     begins = stretch * (np.arange(count) + rng.uniform(_BLOW_FROM, _BLOW_TO, count))
     peaks = part.force * rng.lognormal(0.0, part.peak_scatter, count)
@@ -343,7 +343,7 @@ _STEADY = ("random", "stepped-sine")
 def read_cell(
     part: Exciter, force: Float, rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], int]:
-    """What the force cell and its converter make of a force; see :func:`.output.sensor.digitise`.
+    """Reading of a force by the force cell and its converter; see :func:`.output.sensor.digitise`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""How wrong the rungs of a scene are, what they cost, and the cheapest that will do.
+"""Errors of a scene's rungs, their costs, and the cheapest sufficient ones.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.machine``.
 """

@@ -1,7 +1,7 @@
-"""The least model that a scene needs: errors of its rungs measured on a pilot, the cheapest chosen.
+"""Choice of the cheapest sufficient model of a scene, from errors of its rungs measured on a pilot.
 
-Errors are against the highest admissible rung of every effect. Cost is tabulated, not timed, so
-that the choice is the same on every machine.
+Errors are relative to the highest admissible rung of every effect. Costs are tabulated, not timed,
+so that the choice is the same on every machine.
 """
 
 import math
@@ -19,42 +19,42 @@ from .pilot import Pilot
 from .runs import Quantities
 
 STARTS = 32
-"""Most starts that a difference is averaged over, where they are not cheap."""
+"""Most starts in a mean difference, unless they are cheap."""
 
 MOST_STARTS = 512
-"""The same where they are."""
+"""Most starts in a mean difference if they are cheap."""
 
 PILOT = 128.0
-"""Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
+"""Tabulated time for all starts of the reference together, beyond STARTS [s]."""
 
 _LEAST_ACCURACY = 1e-6
-_ROOM = 0.5  # of the accuracy: what effects that are held low may use up
-_FAR = 3.0  # times the accuracy: beyond it no scatter makes a rung miss
+_ROOM = 0.5  # of the accuracy: share for effects held at low rungs
+_FAR = 3.0  # times the accuracy: beyond it a rung fails whatever the scatter
 
 
 @dataclass(frozen=True, kw_only=True)
 class Resolution:
-    """The combination that was chosen.
+    """The chosen combination.
 
     Attributes
     ----------
     values : mapping of str to object
-        Dotted path -> value, of everything that is not pinned.
+        Dotted path -> value, for everything that is not pinned.
     rungs : mapping of str to str
         Effect -> name of its rung.
     estimated_error : float
-        Largest mean difference to the reference, and its standard error on top [-].
+        Largest mean difference from the reference, plus its standard error [-].
     cost, cost_of_reference : float
-        Tabulated [s].
+        Tabulated time of a run [s].
     status : str
-        ``resolved``; ``unresolvable`` where something cheaper could not be told from the reference
-        for its scatter; ``reference`` where nothing cheaper is good enough.
+        ``resolved``; ``unresolvable`` if something cheaper could not be distinguished from the
+        reference because of scatter; ``reference`` if nothing cheaper is accurate enough.
     reasons : tuple of str
-        Why each rung below the chosen one was not taken.
+        Why each rung below the chosen one was rejected.
     accuracy : float
-        That was asked.
+        Required accuracy.
     runs : int
-        Simulations that the choice took.
+        Number of simulations for the choice.
     """
 
     values: Mapping[str, Any]
@@ -69,7 +69,7 @@ class Resolution:
 
     @property
     def text(self) -> str:
-        """What was chosen, in one line."""
+        """The choice in one line."""
         chosen = ", ".join(f"{name} {rung}" for name, rung in self.rungs.items())
         return (
             f"{self.status} for {self.accuracy:.3g}: {chosen}; error {self.estimated_error:.2%}, "
@@ -78,13 +78,13 @@ class Resolution:
 
 
 def resolved_scene(scene: Scene, resolution: Resolution) -> Scene:
-    """The scene with what was chosen written into it, its fidelity as given.
+    """Copy of the scene with the choice applied and its fidelity set to given.
 
     Parameters
     ----------
     scene : Scene
     resolution : Resolution
-        Of :func:`resolve`.
+        Result of :func:`resolve`.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def resolved_scene(scene: Scene, resolution: Resolution) -> Scene:
 
 
 def free_effects(scene: Scene, pinned: Sequence[str]) -> tuple[Effect, ...]:
-    """Effects of a scene but for those pinned.
+    """Effects of a scene except those pinned.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def free_effects(scene: Scene, pinned: Sequence[str]) -> tuple[Effect, ...]:
 
 
 def checked_accuracy(accuracy: float | None, scene: Scene) -> float:
-    """Accuracy that is asked, the scene's own by default.
+    """Required accuracy, by default the scene's own.
 
     Raises
     ------
@@ -134,32 +134,32 @@ def resolve(
     truth: Collection[str] | None = None,
     pilot: Pilot | None = None,
 ) -> Resolution:
-    """Choose the cheapest rungs and numerics whose error is within the accuracy asked.
+    """Choose the cheapest rungs and numerics with an error within the required accuracy.
 
     Parameters
     ----------
     scene : Scene
-        Its own ``fidelity`` plays no part.
+        Its own ``fidelity`` is ignored.
     quantities : callable
         Quantities of interest of a run; see :data:`Quantities`.
     accuracy : float, optional
-        Error that each of them may carry; the scene's own by default.
+        Largest error of each of them; by default the scene's own.
     pinned : sequence of str
-        Effects that stay as they are written, besides those that the scene pins.
+        Effects that stay as in the scene, in addition to those pinned in the scene.
     starts : int, optional
-        Most starts that a difference is averaged over; by default 32, and up to 512 of a scene
-        whose reference costs so little that they take no more than 128 s by the tables.
+        Most starts in a mean difference; by default 32, and up to 512 for a scene
+        whose reference is so cheap that they take no more than 128 s by the tables.
     seed : int
-        Of the starts.
+        Seed of the starts.
     truth : collection of str, optional
-        As of :class:`Pilot`.
+        See :class:`Pilot`.
     pilot : Pilot, optional
         Runs already made of the same scene.
 
     Returns
     -------
     Resolution
-        Without any wall time in it: the same on every machine.
+        Contains no measured time: the same on every machine.
 
     Raises
     ------
@@ -170,10 +170,10 @@ def resolve(
 
     Notes
     -----
-    Each effect is lowered first by itself, from the best rung down, until what it adds is beyond
-    the accuracy. Combinations of what is left are tried from the cheapest whose differences add up
-    to less, each against the reference. Whatever cannot be told from it for scatter is not taken:
-    doubts fall up.
+    Each effect is first lowered by itself, from the best rung down, until the additional error
+    exceeds the accuracy. Combinations of the remaining rungs are tried from the cheapest whose
+    differences sum to less, each against the reference. A combination that scatter makes
+    indistinguishable is rejected: in doubt, the better rung is taken.
     """
     asked = checked_accuracy(accuracy, scene)
     names = {*pinned, *scene.pinned}
@@ -184,7 +184,7 @@ def resolve(
         asked,
         STARTS if starts is None else starts,
     )
-    comparison, dropped = _that_holds(comparison, effects)
+    comparison, dropped = _without_failing_rungs(comparison, effects)
     refuse_bad_reference(comparison)
     if starts is None:
         comparison.starts = affordable_starts(reference_cost(comparison))
@@ -209,16 +209,15 @@ def resolve(
     )
 
 
-def _that_holds(
+def _without_failing_rungs(
     comparison: Comparison, effects: Sequence[Effect]
 ) -> tuple[Comparison, tuple[str, ...]]:
-    """The comparison without best rungs that do not hold on this machine, and which they are.
+    """Comparison without the best rungs that fail on this machine, and which those are.
 
-    None below the rung that the scene is written with is taken for one: a joint could lose its play
-    without a word.
-    Where that does not cure the reference, the comparison is as it was.
+    No rung below that of the scene is dropped: a joint could lose its play unnoticed.
+    If this does not cure the reference, the comparison is returned unchanged.
     """
-    pilot, held, told = comparison.pilot, comparison, []
+    pilot, held, notes = comparison.pilot, comparison, []
     own = {each.name: each.current(pilot.scene) for each in effects if not each.numerical}
     while fault := pilot.fault(held.values(held.top)):
         better = [n for n in own if own[n] in {rung.name for rung in held.rungs[n][:-1]}]
@@ -227,33 +226,33 @@ def _that_holds(
             return comparison, ()
         name = first_cured(pilot, lower)
         *rest, bad = held.rungs[name]
-        told.append(dropped_text(name, bad, rest[-1], fault))
+        notes.append(dropped_text(name, bad, rest[-1], fault))
         held = Comparison(pilot, {**held.rungs, name: rest}, comparison.accuracy, comparison.starts)
-    return held, tuple(told)
+    return held, tuple(notes)
 
 
 def first_cured(pilot: Pilot, lowered: Mapping[str, Mapping[str, Any]]) -> str:
-    """The effect whose next lower rung lets the reference run; the first where none alone does."""
+    """Effect whose next lower rung lets the reference run; the first effect if none does alone."""
     return next(
         (n for n, values in lowered.items() if not pilot.fault(values)), next(iter(lowered))
     )
 
 
 def dropped_text(name: str, bad: Rung, instead: Rung, fault: str) -> str:
-    """Sentence of a best rung that does not hold."""
+    """Sentence about a best rung that fails."""
     return (
-        f"{name} = {bad.name}: does not hold on this machine, {fault}; errors are against "
+        f"{name} = {bad.name}: fails on this machine, {fault}; errors are relative to "
         f"{name} = {instead.name}"
     )
 
 
 def reference_cost(comparison: Comparison) -> float:
-    """Tabulated cost of a run of the reference [s]."""
+    """Tabulated time of a run of the reference [s]."""
     return cost_of(with_values(comparison.pilot.scene, comparison.values(comparison.top)))
 
 
 def affordable_starts(cost: float) -> int:
-    """Most starts of a reference of that cost [s]: a power of two, as they are doubled.
+    """Most starts for a reference of that cost [s]: a power of two, as they are doubled.
 
     Examples
     --------
@@ -265,13 +264,13 @@ def affordable_starts(cost: float) -> int:
 
 
 def estimated_error(chosen: Candidate) -> float:
-    """Largest mean difference of a candidate, and its standard error on top [-]."""
+    """Largest mean difference of a candidate, plus its standard error [-]."""
     found = chosen.differences.values()
     return max((d.error + d.standard_error for d in found if d.error > 0), default=0.0)
 
 
 def refuse_bad_reference(comparison: Comparison) -> None:
-    """Raise SceneError where the reference of a comparison cannot be run."""
+    """Raise SceneError if the reference of a comparison cannot be run."""
     outcome = comparison.pilot.outcomes(comparison.values(comparison.top), 1)[0]
     if outcome.fault:
         rungs = ", ".join(f"{name} = {rung.name}" for name, rung in comparison.top.items())
@@ -280,7 +279,7 @@ def refuse_bad_reference(comparison: Comparison) -> None:
 
 
 class Single(NamedTuple):
-    """A rung of one effect tried with the others held, and what it adds to their differences."""
+    """A rung of one effect tried with the others fixed, and its additional differences."""
 
     rung: Rung
     candidate: Candidate
@@ -288,12 +287,13 @@ class Single(NamedTuple):
 
 
 def descent(comparison: Comparison) -> dict[str, list[Single]]:
-    """For each effect its rungs below the best that may do, and the first that fails.
+    """Rungs of each effect below the best that may suffice, and the first that fails.
 
-    What saves most is lowered first and stays low while the others are tried, as far as it costs
-    no more than half of the accuracy: the rest is then cheap to run. A doubtful rung is not gone
-    below: what is coarser still could not be told either. One that misses by little is: of many
-    quantities that scatter one may miss by chance, and so does the next rung hardly.
+    The effect that saves most is lowered first and stays low while the others are tried, if that
+    takes no more than half of the accuracy: the remaining runs are then cheap. Below a doubtful
+    rung the search stops, as coarser rungs would be doubtful too. Below a rung that narrowly fails
+    it goes on: of many scattered quantities one may fail by chance, but hardly again at the next
+    rung.
     """
     found: dict[str, list[Single]] = {}
     held = dict(comparison.top)
@@ -319,12 +319,12 @@ def _lowest_cost(comparison: Comparison, name: str) -> float:
 
 
 def leaves_room(candidate: Candidate, accuracy: float) -> bool:
-    """Whether a candidate may be held low while others are tried."""
+    """Whether a candidate may stay low while others are tried."""
     return candidate.verdict == "within" and candidate.error <= _ROOM * accuracy
 
 
 def added_differences(single: Candidate, before: Candidate) -> dict[str, float]:
-    """Mean differences of a candidate over those of the one that it was lowered from."""
+    """Mean differences of a candidate in excess of the one that it was lowered from."""
     if single.verdict == "invalid":
         return {}
     return {
@@ -335,7 +335,7 @@ def added_differences(single: Candidate, before: Candidate) -> dict[str, float]:
 def combinations(
     comparison: Comparison, singles: Mapping[str, list[Single]]
 ) -> Iterator[Candidate]:
-    """Combinations of rungs that may do, cheapest first, judged as they are asked for."""
+    """Combinations of rungs that may suffice, cheapest first, evaluated on demand."""
     choices = []
     for name, top in comparison.top.items():
         good = [s for s in singles[name] if s.candidate.verdict in ("within", "beyond")]

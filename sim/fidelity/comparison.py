@@ -1,4 +1,4 @@
-"""Combinations of rungs judged against the best of them, on as few starts as decide."""
+"""Comparison of combinations of rungs with the best one, on as few starts as necessary."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,13 +10,13 @@ from .differences import FIRST, RESOLVED, Candidate, Difference, differences, ju
 from .ladder import cost_of
 from .pilot import Pilot
 
-_TOLD = 1.0 / 6.0  # of the accuracy: a standard error that takes up two fifths of it by itself
+_DECISIVE = 1.0 / 6.0  # of the accuracy: a standard error that alone takes two fifths of it
 
-_HOPELESS = 2.0  # a standard error of few starts is itself uncertain by half
+_HOPELESS = 2.0  # the standard error from few starts is itself uncertain by half
 
 
 class Comparison:
-    """Judges combinations of rungs against the best of them, with as few starts as tell.
+    """Compares combinations of rungs with the best one, with as few starts as necessary.
 
     Parameters
     ----------
@@ -24,9 +24,9 @@ class Comparison:
     ladders : mapping of str to sequence of Rung
         Effect -> rungs that it may take, cheapest first; the reference has the last of each.
     accuracy : float
-        Error that every quantity may carry.
+        Largest error of every quantity.
     starts : int
-        Most starts that a difference is averaged over.
+        Most starts in a mean difference.
     """
 
     def __init__(
@@ -39,20 +39,20 @@ class Comparison:
         self.pilot, self.accuracy, self.starts = pilot, accuracy, starts
         self.rungs = ladders
         self.top = {name: rungs[-1] for name, rungs in ladders.items() if rungs}
-        self.cap = math.inf  # starts of the time being
+        self.cap = math.inf  # present limit of starts
         self._kept: dict[tuple[tuple[str, str], ...], Candidate] = {}
         self._settled: dict[tuple[tuple[str, str], ...], Candidate] = {}
 
     def share(self, other: "Comparison") -> None:
-        """Judge together with another of the same reference: what one knows the other knows."""
+        """Share results with another comparison with the same reference."""
         self._kept, self._settled = other._kept, other._settled
 
     def settle(self, candidate: Candidate) -> None:
-        """Take over a judgement that was made on better runs than these, for good."""
+        """Adopt a verdict from better runs than these, permanently."""
         self._settled[_names_of(candidate)] = candidate
 
     def settled(self, candidate: Candidate) -> bool:
-        """Whether a judgement is one that was taken over."""
+        """Whether a verdict is an adopted one."""
         return _names_of(candidate) in self._settled
 
     def values(self, rungs: Mapping[str, Rung]) -> dict[str, Any]:
@@ -60,14 +60,14 @@ class Comparison:
         return {path: value for rung in rungs.values() for path, value in rung.values.items()}
 
     def judge(self, rungs: Mapping[str, Rung]) -> Candidate:
-        """Candidate of a combination, with its verdict: anew where more starts may tell."""
+        """Candidate of a combination, with its verdict; evaluated again if more starts may help."""
         known = self.known(rungs)
         if known is None or self._open(known):
-            self._kept[names(rungs)] = known = self._judged(rungs)
+            self._kept[names(rungs)] = known = self._evaluated(rungs)
         return known
 
     def judge_again(self, candidate: Candidate) -> Candidate:
-        """A candidate of an earlier judgement, on more starts where they may tell."""
+        """Candidate of an earlier verdict, with more starts if they may help."""
         rungs = {
             name: next(rung for rung in self.rungs[name] if rung.name == own)
             for name, own in candidate.rungs.items()
@@ -75,12 +75,12 @@ class Comparison:
         return self.judge(rungs)
 
     def known(self, rungs: Mapping[str, Rung]) -> Candidate | None:
-        """Candidate of a combination that has been judged."""
+        """Candidate of a combination that has been evaluated."""
         name = names(rungs)
         return self._settled.get(name) or self._kept.get(name)
 
-    def told(self, candidate: Candidate) -> bool:
-        """Whether more starts would change nothing of a verdict, or are too many."""
+    def decided(self, candidate: Candidate) -> bool:
+        """Whether more starts would not change a verdict, or are too many."""
         if candidate.verdict != "doubtful" or 2 * candidate.starts > self.starts:
             return True
         if self.settled(candidate):
@@ -88,21 +88,21 @@ class Comparison:
         return self._hopeless(candidate.differences, candidate.starts)
 
     def reference(self) -> Candidate:
-        """The reference against itself: its errors are none."""
-        return self._judged(self.top)
+        """The reference compared with itself, without errors."""
+        return self._evaluated(self.top)
 
     def judged(self) -> tuple[Candidate, ...]:
-        """Every combination of its rungs that was judged."""
+        """All combinations of its rungs that were evaluated."""
         own = {name: [rung.name for rung in rungs] for name, rungs in self.rungs.items()}
         known = {**self._kept, **self._settled}.values()
         return tuple(c for c in known if all(c.rungs[n] in rungs for n, rungs in own.items()))
 
     def doubted(self) -> list[Candidate]:
-        """Combinations whose scatter stayed too large to tell, not those near the limit itself."""
-        most = _TOLD * self.accuracy
+        """Combinations whose scatter stayed too large, except those near the limit itself."""
+        most = _DECISIVE * self.accuracy
         return [c for c in self.judged() if c.verdict == "doubtful" and c.standard_error > most]
 
-    def _judged(self, rungs: Mapping[str, Rung]) -> Candidate:
+    def _evaluated(self, rungs: Mapping[str, Rung]) -> Candidate:
         values, reference = self.values(rungs), self.values(self.top)
         starts = 2
         while True:
@@ -120,15 +120,15 @@ class Comparison:
             starts *= 2
 
     def _open(self, known: Candidate) -> bool:
-        """Whether a doubt was only that of few starts, and more are admitted now."""
-        return not self.told(known) and 2 * known.starts <= self.cap
+        """Whether a verdict is open only for lack of starts, and more are now allowed."""
+        return not self.decided(known) and 2 * known.starts <= self.cap
 
     def _more(self, found: Mapping[str, Difference], starts: int) -> bool:
         most = min(self.starts, self.cap)
         return 2 * starts <= most and not self._hopeless(found, starts)
 
     def _hopeless(self, found: Mapping[str, Difference], starts: int) -> bool:
-        """Scatter that even the most starts would not average away: no need to run them."""
+        """Whether even the most starts would not average the scatter away, so that none is run."""
         scatter = max(each.standard_error for each in found.values())
         in_the_end = scatter * math.sqrt(starts / self.starts)
         return starts > FIRST and in_the_end > _HOPELESS * RESOLVED * self.accuracy
@@ -163,5 +163,5 @@ def _names_of(candidate: Candidate) -> tuple[tuple[str, str], ...]:
 
 
 def names(rungs: Mapping[str, Rung]) -> tuple[tuple[str, str], ...]:
-    """A combination by the names of its rungs, in a fixed order."""
+    """A combination as the names of its rungs, in a fixed order."""
     return tuple(sorted((name, rung.name) for name, rung in rungs.items()))

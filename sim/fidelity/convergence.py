@@ -9,13 +9,13 @@ from .comparison import Comparison
 from .differences import FIRST, RESOLVED, STILL, Difference, differences
 from .findings import Convergence
 
-_SIGMAS = 3.0  # beyond so many standard errors a difference is one
+_SIGMAS = 3.0  # standard errors above which a difference is significant
 
-_ROUNDING = 1e-9  # of relative changes: signals have single precision, truth has double
+_ROUNDING = 1e-9  # of relative changes: signals are single, truth is double precision
 
 
 def convergence_of(comparison: Comparison, name: str, rungs: Sequence[Rung]) -> Convergence | None:
-    """Convergence over the starts that its levels were judged on, or more while they scatter."""
+    """Convergence over the starts of its levels' verdicts, or more while they scatter."""
     judged = [comparison.judge({**comparison.top, name: rung}) for rung in rungs]
     starts, found = min(c.starts for c in judged[:-1]), None
     most = min(comparison.starts, comparison.cap)
@@ -33,7 +33,7 @@ def convergence_of(comparison: Comparison, name: str, rungs: Sequence[Rung]) -> 
         scatter = max(each.standard_error for each in last.values()) / comparison.accuracy
         if scatter <= (RESOLVED if starts >= FIRST else STILL):
             return found
-        if 2 * starts > most:  # few scattered starts show nothing
+        if 2 * starts > most:  # too few scattered starts
             return found if 2 * starts > comparison.starts else None
         starts *= 2
 
@@ -46,17 +46,17 @@ def _order(
     last: Difference,
     accuracy: float,
 ) -> Convergence:
-    """What the last two changes of a quantity say of the finest level."""
+    """Order and remaining error from the last two changes of a quantity."""
     silent = last.error <= max(_SIGMAS * last.standard_error, _ROUNDING)
     order = math.log2(abs(before / last.mean)) if before and last.mean else math.nan
-    told = not silent and math.isfinite(order) and order > 0
-    remaining = last.error / (2**order - 1) if told else last.error
+    resolved = not silent and math.isfinite(order) and order > 0
+    remaining = last.error / (2**order - 1) if resolved else last.error
     return Convergence(
         effect=effect,
         levels=tuple(rung.name for rung in rungs),
         quantity=quantity,
         steps=(before, last.mean),
-        order=order if told else math.nan,
+        order=order if resolved else math.nan,
         remaining=remaining,
         converged=silent or remaining <= RESOLVED * accuracy,
     )

@@ -1,7 +1,7 @@
 """Differences of runs from those of a reference, and whether they are within an accuracy.
 
 Contact with clearance is chaotic: differences are means over starts, and a difference below their
-scatter is none.
+scatter is not significant.
 """
 
 import math
@@ -15,31 +15,31 @@ from scipy.special import chdtri, stdtrit
 from .runs import Quantity
 
 RESOLVED = 1.0 / 3.0
-"""Of the accuracy asked: standard error that a judgement needs."""
+"""Standard error needed for a verdict, over the required accuracy."""
 
 FIRST = 4
-"""Starts that a scattered difference is judged on at the earliest."""
+"""Least number of starts for a verdict on a scattered difference."""
 
 STILL = 0.01
-"""Of the accuracy asked: scatter below it is none."""
+"""Scatter that counts as none, over the required accuracy."""
 
-_SURELY_OFF = 0.99865  # chance of as much, by Student's distribution
+_SURELY_OFF = 0.99865  # confidence, by Student's distribution
 
-_SURELY_NEAR = 0.99  # as one looks up to seven times
+_SURELY_NEAR = 0.99  # lower, as there are up to seven checks
 
-_LEVEL = math.log(10) / 20  # relative change of an amplitude for a dB
+_LEVEL = math.log(10) / 20  # relative change of an amplitude per dB
 
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Of one quantity between a candidate and the reference.
+    """Difference of one quantity between a candidate and the reference.
 
     Attributes
     ----------
     mean : float
-        Over the starts, relative: of a level that of its amplitude, of others as their kind says.
+        Mean over the starts, relative: for a level that of its amplitude, for others by their kind.
     standard_error : float
-        Of that mean.
+        Standard error of that mean.
     """
 
     mean: float
@@ -47,32 +47,32 @@ class Difference:
 
     @property
     def error(self) -> float:
-        """Size of the mean difference [-]."""
+        """Absolute mean difference [-]."""
         return abs(self.mean)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """One combination of rungs.
+    """A combination of rungs.
 
     Attributes
     ----------
     rungs : mapping of str to str
         Effect -> name of its rung.
     values : mapping of str to object
-        Dotted path -> value that puts the combination into the scene.
+        Dotted path -> value that sets the combination in the scene.
     cost : float
-        Tabulated, of one run [s].
+        Tabulated time of one run [s].
     differences : mapping of str to Difference
-        Of every quantity; empty where the combination is not valid.
+        Differences of all quantities; empty if the combination is not valid.
     starts : int
-        That the differences are means of.
+        Number of starts in the differences.
     verdict : str
-        ``within``, ``beyond``, ``doubtful`` (scatter too large to tell) or ``invalid``.
+        ``within``, ``beyond``, ``doubtful`` (too much scatter) or ``invalid``.
     reason : str
-        Why it is not within.
+        Reason for not being within.
     seconds : float
-        Least time of a run that was measured [s]; NaN without a clock.
+        Least measured time of a run [s]; NaN without a clock.
     """
 
     rungs: Mapping[str, str]
@@ -86,14 +86,14 @@ class Candidate:
 
     @property
     def error(self) -> float:
-        """Largest of its quantities' errors; infinite where it is not valid."""
+        """Largest error of its quantities; infinite if it is not valid."""
         if not self.differences:
             return math.inf
         return max(each.error for each in self.differences.values())
 
     @property
     def standard_error(self) -> float:
-        """Largest of its quantities' standard errors."""
+        """Largest standard error of its quantities."""
         return max((each.standard_error for each in self.differences.values()), default=math.inf)
 
 
@@ -110,7 +110,7 @@ def differences(
     Returns
     -------
     dict of str to Difference
-        Infinite where the candidate lacks a quantity. One start alone has no scatter to be told.
+        Infinite if the candidate lacks a quantity. From a single start no scatter can be estimated.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def _unit(kind: str, scale: float, size: float) -> float:
 
 
 def judgement(found: Mapping[str, Difference], starts: int, accuracy: float) -> str:
-    """``within``, ``beyond``, or ``more``: further starts are needed to tell."""
+    """``within``, ``beyond``, or ``more`` if further starts are needed."""
     each = found.values()
     scatter = max(d.standard_error for d in each)
     far, near = (float(stdtrit(starts - 1, chance)) for chance in (_SURELY_OFF, _SURELY_NEAR))
@@ -164,7 +164,7 @@ def judgement(found: Mapping[str, Difference], starts: int, accuracy: float) -> 
 
 
 def why(found: Mapping[str, Difference], verdict: str) -> str:
-    """Reason of a verdict in words; empty of one that is within the accuracy."""
+    """Reason of a verdict in words; empty for one within the accuracy."""
     if verdict == "within":
         return ""
     name, worst = max(found.items(), key=lambda item: item[1].error)
@@ -175,7 +175,7 @@ def why(found: Mapping[str, Difference], verdict: str) -> str:
 
 
 def surely_within(candidate: Candidate) -> float:
-    """Error that no quantity of a candidate exceeds, with 95 per cent confidence [-].
+    """Bound on the error of all quantities of a candidate, with 95 per cent confidence [-].
 
     Parameters
     ----------
@@ -184,13 +184,13 @@ def surely_within(candidate: Candidate) -> float:
     Returns
     -------
     float
-        By Student's distribution of the starts, Bonferroni's share of the doubt to each quantity;
-        infinite of fewer than two starts, or where nothing could be run.
+        By Student's distribution over the starts, with Bonferroni's correction for the quantities;
+        infinite for fewer than two starts, or if nothing could be run.
 
     Examples
     --------
-    >>> told = {"rms": Difference(mean=0.01, standard_error=0.002)}
-    >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=told, starts=16)
+    >>> known = {"rms": Difference(mean=0.01, standard_error=0.002)}
+    >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=known, starts=16)
     >>> round(surely_within(one), 4)
     0.0143
     """
@@ -206,29 +206,29 @@ _FEWEST = 2
 _DOUBT = 0.05
 
 
-def starts_to_tell(candidate: Candidate, accuracy: float) -> int:
-    """Starts after which a candidate would be judged, if its errors stay as they are.
+def starts_to_decide(candidate: Candidate, accuracy: float) -> int:
+    """Number of starts for a verdict on a candidate, if its errors stay the same.
 
     Parameters
     ----------
     candidate : Candidate
-        Of two starts at least.
+        With at least two starts.
     accuracy : float
-        That is asked.
+        Required accuracy.
 
     Returns
     -------
     int
-        Doubled as a comparison doubles them. The scatter of few starts is uncertain itself: it is
-        taken as large as that of all quantities together is in all but one case of ten. An error
-        at the accuracy is never told; that of few starts is then no more than a guess, and so is
-        what is returned.
+        A power of two times the present number. The scatter of few starts is itself uncertain: it
+        is assumed as large as that of all quantities together is in all but one case of ten. An
+        error equal to the accuracy is never decided; an error from few starts is only a guess, and
+        so is the result.
 
     Examples
     --------
-    >>> told = {"rms": Difference(mean=0.01, standard_error=0.02)}
-    >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=told, starts=4)
-    >>> starts_to_tell(one, 0.03)
+    >>> known = {"rms": Difference(mean=0.01, standard_error=0.02)}
+    >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=known, starts=4)
+    >>> starts_to_decide(one, 0.03)
     128
     """
     first, found = max(candidate.starts, _FEWEST), candidate.differences.values()
@@ -249,4 +249,4 @@ def starts_to_tell(candidate: Candidate, accuracy: float) -> int:
 
 _UNLIKELY = 0.1
 
-_ENDLESS = 1024  # times the starts that there are
+_ENDLESS = 1024  # times the present number of starts

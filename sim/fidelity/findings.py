@@ -1,4 +1,4 @@
-"""What a study of a scene's rungs found: convergence, cost of single rungs, the cheapest choice."""
+"""Results of a study of a scene's rungs: convergence, cost of single rungs, the cheapest choice."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,24 +10,24 @@ from .differences import Candidate
 
 @dataclass(frozen=True, kw_only=True)
 class Convergence:
-    """How the reference converges with the level of one numerical effect.
+    """Convergence of the reference with the level of one numerical effect.
 
     Attributes
     ----------
     effect : str
     levels : tuple of str
-        Coarse to fine, the last is that of the reference.
+        Coarse to fine; the last is that of the reference.
     quantity : str
-        The one that moves most.
+        Quantity with the largest change.
     steps : tuple of float
         Its changes from level to level [-].
     order : float
-        Observed, base two; NaN where it cannot be told.
+        Observed order, base two; NaN if it cannot be determined.
     remaining : float
-        Error left in the reference after Richardson; the last change where there is no order [-].
+        Remaining error of the reference after Richardson; the last change if there is no order [-].
     converged : bool
-        What remains is below the accuracy's third, or the last change is below scatter. Changes
-        that shrink slowly leave much.
+        The remaining error is below a third of the accuracy, or the last change is below scatter.
+        Changes that shrink slowly leave a large error.
     """
 
     effect: str
@@ -41,7 +41,7 @@ class Convergence:
 
 @dataclass(frozen=True, kw_only=True)
 class Raise:
-    """What one rung of the scene as written costs: its error against the best rung of its effect.
+    """Error of one rung of the scene as written, relative to the best rung of its effect.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Raise:
     written, best : str
         Names of the rungs.
     candidate : Candidate
-        The scene as written, against itself with that one rung raised.
+        The scene as written, compared with itself with that one rung raised.
     """
 
     effect: str
@@ -60,28 +60,28 @@ class Raise:
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """The cheapest combination of rungs that is good enough, among those that may be chosen.
+    """The cheapest sufficient combination of rungs, among those that may be chosen.
 
     Attributes
     ----------
     reference : Candidate
-        The best of them, which all errors are taken against.
+        The best combination, the reference of all errors.
     written : Candidate or None
-        The scene as it is written; None where it has not been measured.
+        The scene as written; None if it has not been measured.
     chosen : Candidate
-        Cheapest that is within the accuracy, by the tables; the reference where nothing else is.
-        Of a search that was ended before, the cheapest that may be, for all that is known, or
-        else the cheapest of those that are surely off by the least.
+        Cheapest combination within the accuracy, by the tables; the reference if there is none.
+        For an unfinished search, the cheapest that may be within it by present knowledge, or
+        else the cheapest of those with the least guaranteed error.
     status : str
-        ``resolved``; ``so far`` where the search was ended before; ``unresolvable`` where
-        something cheaper could not be told from the reference for scatter; ``not converged``
-        where the reference itself is off by more than the accuracy.
+        ``resolved``; ``so far`` if the search is unfinished; ``unresolvable`` if
+        something cheaper could not be distinguished from the reference because of scatter;
+        ``not converged`` if the reference itself has an error beyond the accuracy.
     candidates : tuple of Candidate
-        All that were measured, cheapest first.
+        All measured combinations, cheapest first.
     convergence : tuple of Convergence
-        Of the reference, for each numerical effect.
+        Convergence of the reference, for each numerical effect.
     changes : mapping of str to object
-        Dotted path -> value that turns the scene as written into the chosen one.
+        Dotted path -> value that changes the scene as written to the chosen one.
     """
 
     reference: Candidate
@@ -94,46 +94,46 @@ class Answer:
 
     @property
     def left(self) -> float:
-        """Error of the reference itself, of the effects that have not converged [-]."""
+        """Error of the reference itself, from the effects that have not converged [-]."""
         return unconverged(self.convergence)
 
     @property
     def doubted(self) -> tuple[Candidate, ...]:
-        """Cheaper combinations that could not be told from the reference."""
+        """Cheaper combinations that could not be distinguished from the reference."""
         cheaper = (c for c in self.candidates if c.cost < self.chosen.cost)
         return tuple(c for c in cheaper if c.verdict == "doubtful")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Error and cost of every combination that matters.
+    """Error and cost of every relevant combination.
 
     Attributes
     ----------
     accuracy : float
     written : mapping of str to str
-        Effect -> rung of the scene as it is written.
+        Effect -> rung of the scene as written.
     kept : Answer
-        Where only numerics may change: against the same rungs with the finest numerics.
+        Answer if only numerics may change: relative to the same rungs with the finest numerics.
     raised : Answer or None
-        Where rungs may change as well: against the highest admissible rung of every effect. None
-        where no rung may, or the best of them were not measured.
+        Answer if rungs may change as well: relative to the highest admissible rung of every effect.
+        None if no rung may change, or the best of them were not measured.
     raises : tuple of Raise
-        What each rung of the scene as written costs by itself.
+        Error of each single rung of the scene as written.
     refused : tuple of str
         Rungs that the scene does not admit, with the reason.
     pruned : tuple of str
-        Rungs that another is better and cheaper than.
+        Rungs that are both worse and costlier than another.
     measured, planned : int
-        Combinations measured at all, and all that are known to be of interest.
+        Number of combinations measured, and number known to be relevant.
     status : str
         ``resolved``, ``unresolvable``, ``not converged``, or ``out of budget``.
     duration : float or None
-        Length of the recording of each run, where it was cut [s].
+        Length of each run's recording, if it was shortened [s].
     share : float
-        Of the time that a run of the scene simulates: what each run did.
+        Share of a full run's simulated time in each run.
     seconds_left : float
-        Of one core, that the known combinations still take [s]; NaN without a clock.
+        Time still needed for the known combinations on one core [s]; NaN without a clock.
     """
 
     accuracy: float
@@ -152,27 +152,27 @@ class Study:
 
     @property
     def whole(self) -> Answer:
-        """The answer of widest choice."""
+        """The answer with the widest choice."""
         return self.raised or self.kept
 
     @property
     def reference(self) -> Candidate:
-        """Best rungs that were compared with."""
+        """Best rungs, the reference of the errors."""
         return self.whole.reference
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """Those of the widest choice, cheapest first."""
+        """Candidates of the widest choice, cheapest first."""
         return self.whole.candidates
 
     @property
     def convergence(self) -> tuple[Convergence, ...]:
-        """Of the reference of the widest choice."""
+        """Convergence of the reference of the widest choice."""
         return self.whole.convergence
 
     @property
     def front(self) -> tuple[Candidate, ...]:
-        """Candidates that no cheaper one is better than."""
+        """Candidates that no cheaper one surpasses."""
         found: list[Candidate] = []
         for one in sorted(self.candidates, key=lambda c: (c.cost, c.error)):
             if math.isfinite(one.error) and (not found or one.error < found[-1].error):
@@ -181,9 +181,9 @@ class Study:
 
 
 def unconverged(levels: Sequence[Convergence]) -> float:
-    """Error that effects which have not converged leave in a reference, all together [-].
+    """Sum of the errors left in a reference by effects that have not converged [-].
 
-    Infinite where changes do not shrink from level to level: the last of them bounds nothing.
+    Infinite if changes do not shrink from level to level: the last of them bounds nothing.
     """
     open_ = [each for each in levels if not each.converged]
     return sum(e.remaining if math.isfinite(e.order) else math.inf for e in open_)

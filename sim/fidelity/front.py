@@ -1,6 +1,6 @@
-"""Combinations of rungs worth running besides the answer: those that errors alone do not rule out.
+"""Combinations of rungs worth running besides the answer: those not ruled out by single errors.
 
-`numerical` names the effects of which a finer rung only costs: steps, tolerances and meshes.
+`numerical` names the effects whose finer rungs only add cost: steps, tolerances and meshes.
 """
 
 import math
@@ -12,11 +12,11 @@ from .choose import added_differences, largest_sum, leaves_room
 from .comparison import Comparison
 from .ladder import cost_of
 
-SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
+SPARED = 1.5  # a predicted error up to this factor behind the front is run, as sums are estimates
 
 
 def cheapest_numerics(comparison: Comparison, numerical: Set[str]) -> dict[str, Rung]:
-    """The best rungs with the cheapest numerics that use up no more than half the accuracy."""
+    """The best rungs with the cheapest numerics that use no more than half the accuracy."""
     found = dict(comparison.top)
     for name in numerical & set(comparison.rungs):
         for rung in comparison.rungs[name]:
@@ -39,17 +39,17 @@ def _single(comparison: Comparison, numerical: Set[str], name: str, rung: Rung) 
 
 
 def _base(comparison: Comparison, numerical: Set[str]) -> dict[str, Rung]:
-    """What rungs of physics are tried in by themselves: the best rungs, cheaply run."""
+    """Rungs in which physical rungs are tried singly: the best rungs, with cheap numerics."""
     lowered = cheapest_numerics(comparison, numerical)
     known = comparison.known(lowered)
-    told = known is not None and leaves_room(known, comparison.accuracy)
-    return lowered if told else dict(comparison.top)
+    cheap = known is not None and leaves_room(known, comparison.accuracy)
+    return lowered if cheap else dict(comparison.top)
 
 
 def undominated(
     comparison: Comparison, numerical: Set[str]
 ) -> tuple[dict[str, list[Rung]], list[str]]:
-    """Rungs of each effect that no cheaper one is as good as, by their errors alone; others."""
+    """Rungs of each effect that no cheaper one equals, by their single errors; and the others."""
     kept: dict[str, list[Rung]] = {}
     pruned = []
     for name, rungs in comparison.rungs.items():
@@ -60,9 +60,9 @@ def undominated(
             cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
             best = min((other.error for other in cheaper), default=math.inf)
             if single.verdict == "invalid":
-                continue  # its reason stands among what is not valid
+                continue  # its reason is listed as invalid
             if best <= single.error:
-                pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
+                pruned.append(f"{name} = {rung.name}: a cheaper one has no larger error")
             else:
                 kept[name].append(rung)
     return kept, pruned
@@ -71,7 +71,7 @@ def undominated(
 def by_cost(
     comparison: Comparison, numerical: Set[str], kept: Mapping[str, list[Rung]]
 ) -> list[dict[str, Rung]]:
-    """Combinations, cheapest first; those that errors alone put behind others left out."""
+    """Combinations, cheapest first, without those that single errors place behind others."""
     before = {
         name: comparison.judge(_single(comparison, numerical, name, comparison.top[name]))
         for name in kept

@@ -1,4 +1,4 @@
-"""The rungs of any scene, and what a run of it costs: both as its machine registers them."""
+"""Rungs of any scene and cost of a run, as registered by its machine."""
 
 from ..machine.registry import machine_of
 from ..scene.rungs import Effect
@@ -6,7 +6,7 @@ from ..scene.scene import Scene
 
 
 def effects_of(scene: Scene) -> tuple[Effect, ...]:
-    """Effects of a scene, each with its rungs; an effect that is absent has no entry.
+    """Effects of a scene, each with its rungs; absent effects are omitted.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def effects_of(scene: Scene) -> tuple[Effect, ...]:
 
 
 def cost_of(scene: Scene) -> float:
-    """Time that a run takes by the tables: predicted steps times tabulated cost [s].
+    """Time of a run by the tables: predicted steps times tabulated cost [s].
 
     Parameters
     ----------
@@ -49,4 +49,4 @@ def cost_of(scene: Scene) -> float:
 
 
 VALIDITY = {"tension_share": 0.0}
-"""Numerics of a run -> most of it within the validity of its rungs."""
+"""Numerics of a run -> largest value within the validity of its rungs."""

@@ -1,7 +1,7 @@
 """Pilot runs of a scene in any combination of rungs, each start once.
 
-What was measured can be kept and taken up again; runs may be spread over workers, and lie side by
-side where that is faster. None of it changes a result.
+Results can be stored and reused; runs may be distributed over workers, and run in parallel lanes
+if that is faster. This does not change any result.
 """
 
 import copy
@@ -29,7 +29,7 @@ from .ladder import cost_of
 from .runs import Group, Outcome, Quantities, Spread, Task, grouped, kind_of, outcomes_of, warm
 
 TIMED = 3
-"""Starts of a rung that are timed, each of which does all that a recording takes."""
+"""Number of timed starts of a rung, each with all work of a recording."""
 
 _GOLDEN = 0.6180339887498949  # fractions of a turn: evenly spread for any number of starts
 
@@ -37,7 +37,7 @@ _Start = tuple[Mapping[str, Any], int]  # values of a combination, and the numbe
 
 
 class OutOfTimeError(Exception):
-    """A run was not begun, as there is no time for it."""
+    """A run was not started, because there is no time for it."""
 
 
 class Pilot:
@@ -47,18 +47,18 @@ class Pilot:
     ----------
     scene : Scene
     quantities : callable
-        Of :data:`Quantities`.
+        See :data:`Quantities`.
     seed : int
-        Other starts for another one.
+        Determines the starts.
     truth : collection of str, optional
-        Names of the truth that the quantities read, so that starts may run side by side; by default
-        any of it, which takes a run of its own.
+        Names of the truth that the quantities use, so that starts may run in parallel lanes; by
+        default all truth, which needs single runs.
     clock : callable, optional
-        Seconds; only what is reported as measured depends on it.
+        Returns seconds; affects only reported times.
     kept : mapping, optional
         Outcomes by name: those of an earlier pilot are not run again, new ones are added.
     spread : callable, optional
-        As :data:`Spread`; one after the other by default. Quantities and clock must then be
+        See :data:`Spread`; by default one after the other. Quantities and clock must then be
         importable by name.
     """
 
@@ -79,7 +79,7 @@ class Pilot:
         self.runs = 0
         self.late: Callable[[float], bool] = lambda _expected: False
         self._spread, self.at_once = spread, at_once
-        self.common: Mapping[str, Any] = {}  # values of every run besides, such as its length
+        self.common: Mapping[str, Any] = {}  # values common to all runs, such as their length
         self._kept: MutableMapping[str, Outcome] = {} if kept is None else kept
         self._outcomes: dict[str, list[Outcome]] = {}
         self._tabulated: dict[str, float] = {}
@@ -90,7 +90,7 @@ class Pilot:
     def uncut(self) -> "Pilot":
         """The same runs without the values common to these, such as a shorter length.
 
-        They are not timed themselves: what they are expected to take is by the times of these.
+        They are not timed: their expected times follow from the times of these.
         """
         whole = copy.copy(self)
         whole.clock, whole.common = None, {}
@@ -98,22 +98,22 @@ class Pilot:
         return whole
 
     def outcomes(self, values: Mapping[str, Any], starts: int) -> list[Outcome]:
-        """Outcomes of the first so many starts, up to one that fails."""
+        """Outcomes of the first starts, up to one that fails."""
         self.fill([values], starts)
         return self._outcomes[_key(values)][:starts]
 
     def fault(self, values: Mapping[str, Any]) -> str:
-        """Why a combination cannot be run, by the starts made so far and the first at least."""
+        """Why a combination cannot be run, from the starts made so far, at least the first."""
         self.outcomes(values, 1)
         return next((each.fault for each in self._outcomes[_key(values)] if each.fault), "")
 
     def fill(self, combinations: Sequence[Mapping[str, Any]], starts: int) -> None:
-        """Make what is missing of the first so many starts of some combinations.
+        """Run the missing ones among the first starts of some combinations.
 
         Raises
         ------
         OutOfTimeError
-            ``late`` said so before a run; what was made by then is kept.
+            ``late`` returned true before a run; earlier results are kept.
         """
         different = [*{_key(values): values for values in combinations}.values()]
         while missing := self._missing(different, starts):
@@ -128,23 +128,23 @@ class Pilot:
 
     def seconds(self, values: Mapping[str, Any]) -> float:
         """Least time of a run so far [s]; NaN without a clock."""
-        told = [each.seconds for each in self._outcomes.get(_key(values), [])[:TIMED]]
-        return min((each for each in told if math.isfinite(each)), default=math.nan)
+        times = [each.seconds for each in self._outcomes.get(_key(values), [])[:TIMED]]
+        return min((each for each in times if math.isfinite(each)), default=math.nan)
 
     def tabulated(self, values: Mapping[str, Any], first: int, last: int) -> float:
-        """Time of the starts from `first` to before `last` by the tables [s], less side by side."""
+        """Tabulated time of the starts `first` to `last` - 1 [s], less in parallel lanes."""
         timed = range(first, min(last, TIMED)) if self.clock else ()
         others = last - first - len(timed)
         together = others >= FIRST and self._kind((values, TIMED)) is not None
         return self._cost(values) * (len(timed) + others * (_FASTER if together else 1.0))
 
     def measured(self, tabulated: float) -> float:
-        """Time that so much by the tables takes here [s]; NaN where nothing was timed."""
+        """Time on this machine for a tabulated time [s]; NaN if nothing was timed."""
         scale = self._timed_by._scale()
         return scale * tabulated if scale > 0 else math.nan
 
     def _missing(self, combinations: Sequence[Mapping[str, Any]], starts: int) -> list[_Start]:
-        """Starts that no outcome is known of, the first ones of all combinations first."""
+        """Starts without an outcome, the first ones of all combinations first."""
         known = [self._known(values, starts) for values in combinations]
         return [
             (values, start)
@@ -154,7 +154,7 @@ class Pilot:
         ]
 
     def _known(self, values: Mapping[str, Any], starts: int) -> int:
-        """How many of the first so many starts need no run: they are kept, or past a fault."""
+        """How many of the first starts need no run: they are stored, or follow a fault."""
         rows = self._outcomes.setdefault(_key(values), [])
         name = self._name(values)
         while len(rows) < starts and not (rows and rows[-1].fault):
@@ -172,7 +172,7 @@ class Pilot:
         return _key({**values, **self.common})
 
     def _batch(self, missing: Sequence[_Start]) -> list[tuple[_Start, ...]]:
-        """What is handed out together: a group for each worker, or runs alone for a second."""
+        """Next runs to distribute: a group for each worker, or single runs for a second."""
         groups = grouped(missing, self._kind)
         seconds = self.seconds(groups[0][0][0])
         each = max(1, min(int(1.0 / seconds), _MOST_AT_ONCE)) if seconds > 0 else 1
@@ -185,7 +185,7 @@ class Pilot:
         return batch
 
     def _kind(self, run: _Start) -> Hashable | None:
-        """As :func:`kind_of`; None of a run that is timed."""
+        """Like :func:`kind_of`; None for a run that is timed."""
         values, start = run
         if self.clock is not None and start < TIMED:
             return None
@@ -195,32 +195,32 @@ class Pilot:
         return self._kinds[name]
 
     def _expected(self, batch: Sequence[Sequence[_Start]]) -> float:
-        """Time that a batch is expected to take [s]; 0 where nothing is known."""
+        """Expected time of a batch [s]; 0 if nothing is known."""
         if self._timed_by.clock is None:
             return 0.0
         scale = self._timed_by._scale()
-        told = {_key(values): self.seconds(values) for runs in batch for values, _ in runs}
+        expected = {_key(values): self.seconds(values) for runs in batch for values, _ in runs}
         for values in (values for runs in batch for values, _ in runs):
-            if not math.isfinite(told[_key(values)]):
-                told[_key(values)] = scale * self._cost(values)
+            if not math.isfinite(expected[_key(values)]):
+                expected[_key(values)] = scale * self._cost(values)
         each = (
-            sum(told[_key(values)] for values, _ in runs) * (_FASTER if len(runs) > 1 else 1.0)
+            sum(expected[_key(values)] for values, _ in runs) * (_FASTER if len(runs) > 1 else 1.0)
             for runs in batch
         )
         return sum(each) / self.at_once
 
     def _scale(self) -> float:
-        """Measured time for a tabulated second, as the combinations that ran tell; 0 of none."""
-        told = [
+        """Measured time per tabulated second, from the combinations that ran; 0 without any."""
+        ratios = [
             each.seconds / self._cost(json.loads(key))
             for key, rows in self._outcomes.items()
             for each in rows[:1]
             if math.isfinite(each.seconds) and self._cost(json.loads(key)) > 0
         ]
-        return float(np.median(told)) if told else 0.0
+        return float(np.median(ratios)) if ratios else 0.0
 
     def _cost(self, values: Mapping[str, Any]) -> float:
-        """Tabulated time of a run [s]; 0 of a combination that the scene refuses."""
+        """Tabulated time of a run [s]; 0 for a combination that the scene refuses."""
         key = _key(values)
         if key not in self._tabulated:
             try:
@@ -247,7 +247,7 @@ class Pilot:
 
     def _run(self, values: Mapping[str, Any], start: int) -> Outcome:
         self.runs += 1
-        warm.add(self.scene.machine)  # the next start is of this process too, and warm
+        warm.add(self.scene.machine)  # the next start also runs in this process, which is now warm
         return outcomes_of((self._task(values, start),))[0]
 
     def _task(self, values: Mapping[str, Any], start: int) -> Task:
@@ -266,7 +266,7 @@ class Pilot:
 
 _MOST_AT_ONCE = 8
 
-_FASTER = 0.5  # at least: share of the time that runs side by side take
+_FASTER = 0.5  # at least: share of the time of single runs when in parallel lanes
 
 
 def _key(values: Mapping[str, Any]) -> str:

@@ -1,7 +1,7 @@
-"""One run of a scene for a worker: what it is asked for, what came out, which lie side by side.
+"""Runs of a scene for a worker: tasks, outcomes, and grouping into parallel lanes.
 
-Quantities of interest reach this file as a callable from above. None of how runs are grouped or
-spread over workers changes a result.
+Quantities of interest are passed in as a callable. Grouping and distribution over workers do not
+change any result.
 """
 
 import math
@@ -15,82 +15,82 @@ from ..scene.scene import Scene, SceneError
 from .ladder import VALIDITY
 
 Quantity = tuple[float, str, float]
-"""Value, kind ("dB", "relative" or "absolute") and scale: the least size a relative error is taken
-of, the size an absolute one is taken of; of no meaning to a level."""
+"""Value, kind ("dB", "relative" or "absolute") and scale: the least reference size of a relative
+error, the reference size of an absolute one; ignored for a level."""
 
 Quantities = Callable[[Recording, Scene], Mapping[str, Quantity]]
 """Quantities of interest of a run with its truth, by name."""
 
-_LEAST_TIMED = 0.3  # s: a run that takes less is repeated until so much has gone by
+_LEAST_TIMED = 0.3  # s: a shorter run is repeated for at least this time
 
-_MOST_COLD = 3.0  # s: the first run of a process, which loads its kernels, is repeated up to here
+_MOST_COLD = 3.0  # s: limit for repeating a process' first run, which loads its kernels
 
 
 class Outcome(NamedTuple):
-    """Quantities of one run, or why there are none."""
+    """Quantities of a run, or why there are none."""
 
     quantities: Mapping[str, Quantity]
     fault: str
     seconds: float = math.nan
-    """Least time of the run, where it was timed [s]."""
+    """Least time of the run, if it was timed [s]."""
 
 
 class Task(NamedTuple):
-    """One run, for a worker: of a scene with the values of its rungs and its start."""
+    """A run for a worker: a scene with the values of its rungs and its start."""
 
     scene: Scene
     values: Mapping[str, Any]
     quantities: Quantities
     shared: str
-    """Same for runs that differ in their start alone."""
+    """Equal for runs that differ only in their start."""
     number: int
     clock: Callable[[], float] | None
     truth: tuple[str, ...] | None = None
-    """Names of the truth that the quantities read; None: any of it."""
+    """Names of the truth that the quantities use; None: all."""
 
 
 class QuantityError(ValueError):
-    """A run has no such quantity, which is its fault."""
+    """A run lacks a quantity, which is its fault."""
 
 
 Group = tuple[Task, ...]
-"""Tasks that a worker makes together."""
+"""Tasks that a worker runs together."""
 
 Spread = Callable[[Callable[[Group], list[Outcome]], Iterable[Group]], Iterable[list[Outcome]]]
-"""Applies a function to groups and gives the results in order; by workers, say."""
+"""Applies a function to groups and returns the results in order, for example by workers."""
 
 
 def outcomes_of(tasks: Group) -> list[Outcome]:
-    """Make runs, side by side where that is faster.
+    """Run tasks, in parallel lanes if that is faster.
 
     Parameters
     ----------
     tasks : tuple of Task
-        With a clock a run does all that a recording takes, by itself; without, what its like have
-        done before in this process is taken over.
+        With a clock, a run does all work of a recording by itself; without, work that similar runs
+        have done in this process is reused.
 
     Returns
     -------
     list of Outcome
         In the order of the tasks, with the quantities of each run alone.
     """
-    beside = [task for task in tasks if _may_be_many(task)]
-    if not beside:
+    together = [task for task in tasks if _may_be_many(task)]
+    if not together:
         return [_outcome_of(task) for task in tasks]
-    scenes = [with_values(task.scene, task.values) for task in beside]
-    runs = [(scene, task.number) for scene, task in zip(scenes, beside, strict=True)]
-    truth = {name for task in beside for name in task.truth or ()}
+    scenes = [with_values(task.scene, task.values) for task in together]
+    runs = [(scene, task.number) for scene, task in zip(scenes, together, strict=True)]
+    truth = {name for task in together for name in task.truth or ()}
     found = {
-        id(beside[n]): Outcome({}, run.faults[0])
+        id(together[n]): Outcome({}, run.faults[0])
         if isinstance(run, SceneError)
-        else _told(beside[n], scenes[n], run)
+        else _outcome(together[n], scenes[n], run)
         for n, run in simulate_many(runs, truth=truth)
     }
     return [found[id(task)] if id(task) in found else _outcome_of(task) for task in tasks]
 
 
 def _may_be_many(task: Task) -> bool:
-    """Whether a run needs no more than one of many has; it is faster then even by itself."""
+    """Whether a run can be one of many in lanes, which is faster even for a single one."""
     if task.clock is not None or task.truth is None or not simulates_together(task.scene):
         return False
     try:
@@ -101,7 +101,7 @@ def _may_be_many(task: Task) -> bool:
 
 
 def kind_of(task: Task) -> Hashable:
-    """What tasks must have in common to be made faster together; None of one that runs alone."""
+    """Key of tasks that are faster together; None for one that runs alone."""
     if task.truth is None:
         return None
     try:
@@ -116,19 +116,19 @@ Item = TypeVar("Item")
 def grouped(
     items: Iterable[Item], kind: Callable[[Item], Hashable | None]
 ) -> list[tuple[Item, ...]]:
-    """Runs in groups to be made together.
+    """Group runs that are made together.
 
     Parameters
     ----------
     items : iterable
         Runs in any form.
     kind : callable
-        What those must have in common that are faster together; None of one that runs alone.
+        Key of runs that are faster together; None for one that runs alone.
 
     Returns
     -------
     list of tuple
-        What runs alone first. Then groups of a kind, then what is left of all of them.
+        Single runs first, then full groups of a kind, then the remaining ones.
 
     Examples
     --------
@@ -152,7 +152,7 @@ TOGETHER = 16
 
 
 def _outcome_of(task: Task) -> Outcome:
-    """Make a run by itself."""
+    """Run a task by itself."""
     seconds = math.nan
     try:
         scene = with_values(task.scene, task.values)
@@ -162,10 +162,10 @@ def _outcome_of(task: Task) -> Outcome:
             solution, seconds = _timed(scene, task.number, task.clock)
     except SceneError as error:
         return Outcome({}, error.faults[0])
-    return _told(task, scene, solution, seconds)
+    return _outcome(task, scene, solution, seconds)
 
 
-def _told(task: Task, scene: Scene, solution: Recording, seconds: float = math.nan) -> Outcome:
+def _outcome(task: Task, scene: Scene, solution: Recording, seconds: float = math.nan) -> Outcome:
     fault = _fault(solution)
     if fault:
         return Outcome({}, fault, seconds)
@@ -176,7 +176,7 @@ def _told(task: Task, scene: Scene, solution: Recording, seconds: float = math.n
 
 
 def _fault(solution: Recording) -> str:
-    """Why a run is outside the validity of its rungs; empty where it is not."""
+    """Why a run is outside the validity of its rungs; empty if it is inside."""
     if not solution.status.ok:
         return solution.status.text
     for name, most in VALIDITY.items():
@@ -187,7 +187,7 @@ def _fault(solution: Recording) -> str:
 
 
 def _timed(scene: Scene, number: int, clock: Callable[[], float]) -> tuple[Recording, float]:
-    """A run and its least time; one that takes next to nothing is repeated."""
+    """A run and its least time; a very short one is repeated."""
     least, begin, first = math.inf, clock(), scene.machine not in warm
     while True:
         before = clock()
@@ -201,7 +201,7 @@ def _timed(scene: Scene, number: int, clock: Callable[[], float]) -> tuple[Recor
         first = False
 
 
-warm: set[str] = set()  # machines that this process has run: the first loads its kernels
+warm: set[str] = set()  # machines already run in this process: the first run loads the kernels
 
 _recorders: dict[str, Recorder] = {}
 

@@ -1,8 +1,8 @@
 """Error and cost of the rungs of a scene, cheapest information first.
 
-A study asks two questions of a scene as it is written. Which numerics, step, tolerance and mesh,
-are enough where its rungs stay? And which rungs would be? It can be ended at any time: what is
-known by then is told, with how sure it is.
+A study answers two questions about a scene as written. Which numerics (step, tolerance and mesh)
+are sufficient for its rungs? And which rungs would be sufficient? It can be stopped at any time and
+then returns the present knowledge with its uncertainty.
 """
 
 import math
@@ -38,19 +38,19 @@ from .runs import Quantities
 from .time_left import seconds_of_doubts, seconds_of_front
 from .written import ladder, value_at, written_rung
 
-_CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy wants
+_CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy needs
 
 _LEVELS_SHOWN = 3
 
-_SHORTLIST = 2  # predicted combinations that are measured before the search goes on
+_SHORTLIST = 2  # predicted combinations measured before the search continues
 
-_NO_BOUND = 1.0  # an error that may be as large as the quantity itself is none known
+_NO_BOUND = 1.0  # an error that may be as large as the quantity itself is unknown
 
-_DEAR = 0.8  # s by the tables: a run of the reference that takes more is cut, where it may be
+_EXPENSIVE = 0.8  # s by the tables: longer runs of the reference are shortened, if possible
 
 
 class Search:
-    """Measures a scene's rungs, cheapest information first, and tells what is known so far.
+    """Measures the errors of a scene's rungs, cheapest information first.
 
     Parameters
     ----------
@@ -58,21 +58,21 @@ class Search:
     quantities : callable
         See :data:`wearstate.sim.fidelity.runs.Quantities`.
     accuracy : float, optional
-        The scene's own by default; says when scatter is small enough.
+        By default the scene's own; determines when scatter is small enough.
     pinned : sequence of str
-        Effects that stay as they are written, besides those that the scene pins.
+        Effects that stay as in the scene, in addition to those pinned in the scene.
     starts : int, optional
-        Most starts that a difference is averaged over; by default as
+        Most starts in a mean difference; by default as in
         :func:`wearstate.sim.fidelity.choose.resolve`.
     pilot : Pilot, optional
         Runs already made of the same scene.
-    tell : callable, optional
-        Called with what is measured next.
+    report : callable, optional
+        Called with a description of the next measurement.
 
     Raises
     ------
     SceneError, ValueError
-        As :func:`wearstate.sim.fidelity.choose.resolve`.
+        As in :func:`wearstate.sim.fidelity.choose.resolve`.
     """
 
     def __init__(
@@ -84,46 +84,46 @@ class Search:
         pinned: Sequence[str] = (),
         starts: int | None = None,
         pilot: Pilot | None = None,
-        tell: Callable[[str], None] | None = None,
+        report: Callable[[str], None] | None = None,
     ) -> None:
         self.scene, self.accuracy = scene, checked_accuracy(accuracy, scene)
         self.effects = free_effects(scene, sorted({*pinned, *scene.pinned}))
         self.pilot = pilot or Pilot(scene, quantities)
-        self.tell = tell or (lambda _what: None)
+        self.report = report or (lambda _what: None)
         self.numerical = {each.name for each in self.effects if each.numerical}
         self.written = {each.name: written_rung(each, scene) for each in self.effects}
         self.ladders = {each.name: ladder(each, scene) for each in self.effects}
         self._starts = starts
-        self.share = 1.0  # of the time that a run of the scene simulates
+        self.share = 1.0  # share of a full run's simulated time
         self.kept = self._comparison(
             {n: r if n in self.numerical else (self.written[n],) for n, r in self.ladders.items()}
         )
         self.best = self._whole()
         self.raises = {n: self._raise(n) for n in self.ladders if self._low(n)}
         self.fault = ""  # of the best rungs
-        self._dropped: list[str] = []  # rungs that do not hold on this machine
+        self._dropped: list[str] = []  # rungs that fail on this machine
         self._pruned: list[str] = []
-        self._done: set[int] = set()  # comparisons whose answer is final
-        self._cut_alone: dict[int, str] = {}  # those whose best rungs fail on whole recordings: why
+        self._done: set[int] = set()  # comparisons with a final answer
+        self._cut_alone: dict[int, str] = {}  # comparisons that fail on whole recordings: why
         self._convergence: dict[int, list[Convergence]] = {}
         self._complete = False
-        self.duration: float | None = None  # of the recording of a run, where it is cut [s]
+        self.duration: float | None = None  # length of a run's recording, if it is shortened [s]
 
     def shorten(self, fewest_turns: int) -> None:
-        """Cut the recordings of runs to come, where one of the reference is dear.
+        """Shorten the recordings of future runs if the reference is expensive.
 
-        Means are over as many more starts instead: an answer comes sooner, and is as sure after
-        the same time. Lengths are from tabulated cost, the same on every machine.
+        Means are over correspondingly more starts: results come sooner, with the same confidence
+        after the same time. Lengths are from tabulated cost, the same on every machine.
 
         Parameters
         ----------
         fewest_turns : int
-            Revolutions that a recording must have.
+            Least number of revolutions of a recording.
         """
         scene, speed = self.scene, float(value_at(self.scene, "drive.speed"))
         settling = scene.settling_revolutions / speed
         whole = scene.duration + settling
-        affordable = whole * _DEAR / reference_cost(self.best or self.kept) - settling
+        affordable = whole * _EXPENSIVE / reference_cost(self.best or self.kept) - settling
         turns = max(fewest_turns, math.ceil(affordable * speed))
         if turns / speed >= scene.duration:
             return
@@ -134,7 +134,7 @@ class Search:
             each.starts <<= self._more_starts()
 
     def _more_starts(self) -> int:
-        """Times that starts are doubled for what the runs are shorter."""
+        """Doublings of the starts that compensate for shorter runs."""
         return math.ceil(math.log2(1 / self.share))
 
     def _comparison(self, ladders: Mapping[str, Sequence[Rung]]) -> Comparison:
@@ -145,7 +145,7 @@ class Search:
         return found
 
     def _whole(self) -> Comparison | None:
-        """All rungs against the best of them; None where there is no rung to choose."""
+        """Comparison of all rungs with the best; None if there is no rung to choose."""
         if all(n in self.numerical or len(r) == 1 for n, r in self.ladders.items()):
             return None
         best = self._comparison(self.ladders)
@@ -154,12 +154,12 @@ class Search:
         return best
 
     def _low(self, name: str) -> bool:
-        """Whether an effect has a better rung than the one that is written."""
+        """Whether an effect has a better rung than the scene's."""
         best = self.ladders[name][-1].name
         return name not in self.numerical and self.written[name].name != best
 
     def _raise(self, name: str) -> Comparison:
-        """The scene as written against itself with one rung raised, at numerics fit for both."""
+        """Comparison of the scene with itself with one rung raised, at numerics fit for both."""
         base = level_name(1.0)
         rungs = {
             each: (next((r for r in self.ladders[each] if r.name == base), own),)
@@ -170,22 +170,22 @@ class Search:
         return self._comparison({**rungs, name: (self.written[name], self.ladders[name][-1])})
 
     def measure(self, late: Callable[[float], bool] | None = None) -> None:
-        """Measure until everything is told, or there is no time.
+        """Measure until everything is decided, or there is no time.
 
         Parameters
         ----------
         late : callable, optional
-            Whether a run of so many seconds must not be begun any more. The scene as written is
-            measured against its own finest numerics in any case.
+            Whether a run of so many seconds must no longer be started. The scene as written is
+            compared with its own finest numerics in any case.
 
         Raises
         ------
         SceneError
             The finest numerics of the scene as written cannot be run.
         KeyboardInterrupt
-            What was measured is kept: :meth:`found` tells it.
+            Measurements so far are kept: :meth:`result` returns them.
         """
-        self.tell("the scene as written")
+        self.report("the scene as written")
         self.pilot.late = lambda _expected: False
         at_once, self.pilot.at_once = self.pilot.at_once, 1  # workers take longer to start
         refuse_bad_reference(self.kept)
@@ -208,36 +208,36 @@ class Search:
         return [self.kept, *self.raises.values(), *([self.best] if self.best else [])]
 
     def _answers(self) -> list[Comparison]:
-        """Comparisons that something is chosen of."""
+        """Comparisons from which something is chosen."""
         return [self.kept, *([self.best] if self.best and not self.fault else [])]
 
     def _round(self, cap: float) -> None:
         for each in self._all():
             each.cap = cap
-        self.tell("numerics of the scene as written")
+        self.report("numerics of the scene as written")
         self._answered(self.kept)
         for name in list(self.raises):
-            self.tell(f"what the rung of {name} costs")
+            self.report(f"error of the rung of {name}")
             self._charge(name)
         while self.best is not None and not self._faulty():
             best = self.best
             self._compare(best, cap)
-            if not self.pilot.fault(best.values(best.top)):  # from a later start neither
+            if not self.pilot.fault(best.values(best.top)):  # a later start would not run either
                 break
 
     def _compare(self, best: Comparison, cap: float) -> None:
-        self.tell("the scene as written against the best rungs")
+        self.report("the scene as written against the best rungs")
         best.judge(self.written)
         best.judge({**best.top, **{n: r for n, r in self.written.items() if n in self.numerical}})
         for rungs in self._shortlist(best):
             if best.judge(rungs).verdict == "within":
                 break
         if cap > _CAPS[0]:
-            self.tell("combinations of rungs")
+            self.report("combinations of rungs")
             self._answered(best)
 
     def _charge(self, name: str) -> None:
-        """What a rung of the scene as written costs, against the best that holds."""
+        """Error of a rung of the scene as written, relative to the best working one."""
         while name in self.raises:
             pair = self.raises[name]
             pair.judge({n: rungs[0] for n, rungs in pair.rungs.items()})
@@ -247,7 +247,7 @@ class Search:
             self._drop(name, fault)
 
     def _faulty(self) -> bool:
-        """Whether the best rungs cannot be run, even without those that do not hold together."""
+        """Whether the best rungs cannot be run, even without those that fail together."""
         while self.best is not None:
             best = self.best
             best.judge(best.top)
@@ -261,7 +261,7 @@ class Search:
         return bool(self.fault)
 
     def _drop(self, name: str, fault: str) -> None:
-        """Take the best rung of an effect off its ladder: the next below it is the reference."""
+        """Remove the best rung of an effect: the next below becomes the reference."""
         *lower, bad = self.ladders[name]
         self.ladders = {**self.ladders, name: tuple(lower)}
         self._dropped.append(dropped_text(name, bad, lower[-1], fault))
@@ -279,33 +279,33 @@ class Search:
                 self.best.cap = cap
 
     def _answered(self, comparison: Comparison) -> None:
-        """Search a comparison for its cheapest combination that will do."""
+        """Search a comparison for its cheapest sufficient combination."""
         if id(comparison) in self._done:
             return
-        while self._told(comparison):
+        while self._decide(comparison):
             if self._confirmed(comparison):
                 if id(comparison) not in self._cut_alone:
                     self._done.add(id(comparison))
                 return
 
-    def _told(self, comparison: Comparison) -> bool:
-        """Measure up to the cheapest that will do; whether more starts would change nothing."""
+    def _decide(self, comparison: Comparison) -> bool:
+        """Measure up to the cheapest sufficient one; whether more starts would change nothing."""
         comparison.judge(self.written)
         singles = descent(comparison)
         chosen = next(
             (each for each in combinations(comparison, singles) if each.verdict == "within"),
             comparison.judge(comparison.top),
         )
-        for each in comparison.judged():  # shortlists leave doubts of few starts
-            if each.cost < chosen.cost and not comparison.told(each):
+        for each in comparison.judged():  # short lists leave doubts from few starts
+            if each.cost < chosen.cost and not comparison.decided(each):
                 comparison.judge_again(each)
         self._convergence[id(comparison)] = list(self._convergences(comparison))
-        return all(comparison.told(e) for e in comparison.judged() if e.cost <= chosen.cost)
+        return all(comparison.decided(e) for e in comparison.judged() if e.cost <= chosen.cost)
 
     def _confirmed(self, comparison: Comparison) -> bool:
-        """Judge what would be chosen on whole recordings, where those of the search are cut.
+        """Check the choice on whole recordings, if the search used shortened ones.
 
-        A motion may change over seconds: what agrees over four revolutions may not over forty.
+        A motion may change over seconds: agreement over four revolutions may not last for forty.
 
         Returns
         -------
@@ -314,11 +314,11 @@ class Search:
         """
         if self.duration is None:
             return True
-        self.tell("the choice on whole recordings")
+        self.report("the choice on whole recordings")
         starts = comparison.starts >> self._more_starts()
         whole = Comparison(self.pilot.uncut(), comparison.rungs, self.accuracy, starts)
         fault = whole.pilot.fault(whole.values(whole.top))
-        if fault:  # nothing can be confirmed, and nothing refuted: no answer is final
+        if fault:  # nothing can be confirmed or refuted: no answer is final
             self._cut_alone[id(comparison)] = fault
             return True
         confirmed = True
@@ -329,7 +329,7 @@ class Search:
         return confirmed
 
     def _cheapest(self, comparison: Comparison) -> Candidate | None:
-        """What would be chosen; None where it is the reference."""
+        """Present choice; None if it is the reference."""
         room = self._room(comparison)
         top = {name: rung.name for name, rung in comparison.top.items()}
         judged = sorted(comparison.judged(), key=lambda c: (c.cost, c.error))
@@ -337,11 +337,11 @@ class Search:
         return None if found is None or dict(found.rungs) == top else found
 
     def _room(self, comparison: Comparison) -> float:
-        """Of the accuracy: what the reference is off by counts as well."""
+        """Accuracy left after the reference's own error."""
         return max(self.accuracy - unconverged(self._convergence.get(id(comparison), ())), 0.0)
 
     def _shortlist(self, best: Comparison) -> Iterator[dict[str, Rung]]:
-        """Combinations that may do, as single rungs of the scene as written predict."""
+        """Combinations that may suffice, as predicted from single rungs of the scene as written."""
         choices = [self._predicted(best, name) for name in best.rungs]
         rows: list[tuple[float, int, dict[str, Rung]]] = []
         for combination in product(*choices):
@@ -352,7 +352,7 @@ class Search:
         yield from (rungs for _, _, rungs in sorted(rows, key=lambda row: row[:2])[:_SHORTLIST])
 
     def _predicted(self, best: Comparison, name: str) -> list[tuple[Rung, dict[str, float]]]:
-        """Rungs of an effect with the differences that each is expected to add."""
+        """Rungs of an effect with their expected additional differences."""
         rows: list[tuple[Rung, dict[str, float]]] = [(best.top[name], {})]
         if name in self.raises:
             pair = self.raises[name]
@@ -369,8 +369,8 @@ class Search:
         return rows
 
     def _rest(self) -> None:
-        """What is on the front beside the answers."""
-        self.tell("the rest of the front")
+        """Measure the front beyond the answers."""
+        self.report("the rest of the front")
         widest = self._widest
         widest.judge(cheapest_numerics(widest, self.numerical))
         kept, self._pruned = undominated(widest, self.numerical)
@@ -379,11 +379,11 @@ class Search:
 
     @property
     def _widest(self) -> Comparison:
-        """The comparison of widest choice that can be run."""
+        """The comparison with the widest choice that can be run."""
         return self.kept if self.best is None or self.fault else self.best
 
     def _convergences(self, comparison: Comparison) -> Iterator[Convergence]:
-        """Of every numerical effect with three levels or more; rungs between two are left out."""
+        """Convergence of each numerical effect with three levels or more, omitting those between."""
         levels = {level_name(factor) for factor in STEP_LEVELS}
         for name in comparison.rungs:
             rungs = [r for r in comparison.rungs[name] if r.name in levels][-_LEVELS_SHOWN:]
@@ -392,11 +392,11 @@ class Search:
                 if found is not None:
                     yield found
 
-    # -- what is known
+    # -- results
 
     def progress(self, *, at_all: bool = False) -> tuple[int, int]:
-        """Combinations told, or measured at all, and all that are known to be of interest."""
-        told, known = 0, 0
+        """Number of combinations decided, or measured at all, and of those known to be relevant."""
+        done, known = 0, 0
         for each in self._all():
             singles = single_changes(each, self.numerical) if id(each) not in self._done else []
             if each not in self.raises.values():
@@ -404,14 +404,14 @@ class Search:
             wanted = {names(rungs): each.known(rungs) for rungs in singles}
             wanted |= {tuple(sorted(c.rungs.items())): c for c in each.judged()}
             known += len(wanted) + self._unconfirmed(each)
-            told += sum(c is not None and (at_all or each.told(c)) for c in wanted.values())
-        return (known, known) if self._complete else (told, known)
+            done += sum(c is not None and (at_all or each.decided(c)) for c in wanted.values())
+        return (known, known) if self._complete else (done, known)
 
     def remaining(self) -> float:
-        """Seconds of runs that are still to be made, by the tables: an estimate.
+        """Estimated time of the remaining runs by the tables [s].
 
-        From the combinations that are known, and from scatter and errors as they are; others may
-        come up on the way, and what a few starts tell of an error may prove wrong.
+        From the known combinations, with present scatter and errors; others may be added on the
+        way, and an error estimated from few starts may prove wrong.
         """
         widest = self._widest
         open_ = [each for each in self._all() if each is widest or id(each) not in self._done]
@@ -422,14 +422,14 @@ class Search:
         return known + seconds_of_front(widest, self.numerical)
 
     def _unconfirmed(self, comparison: Comparison) -> bool:
-        """Whether what would be chosen is known of cut recordings alone."""
+        """Whether the present choice is known only from shortened recordings."""
         if self.duration is None or comparison not in self._answers():
             return False
         found = self._cheapest(comparison)
         return found is not None and not comparison.settled(found)
 
     def _confirmation_left(self, comparison: Comparison) -> float:
-        """Time that whole recordings of what would be chosen take by the tables [s]."""
+        """Tabulated time of whole recordings of the present choice [s]."""
         found = self._cheapest(comparison)
         if found is None or not self._unconfirmed(comparison):
             return 0.0
@@ -437,13 +437,13 @@ class Search:
         both = (found.values, comparison.values(comparison.top))
         return sum(runs.tabulated(values, 0, starts) for values in both)
 
-    def found(self) -> Study:
-        """What has been measured so far; nothing is run."""
+    def result(self) -> Study:
+        """Results so far, without further runs."""
         raised = None
         if self.best is not None and not self.fault and self.best.known(self.best.top):
             raised = self._answer(self.best)
         kept = self._answer(self.kept)
-        told, known = self.progress(at_all=True)
+        done, known = self.progress(at_all=True)
         return Study(
             accuracy=self.accuracy,
             written={name: rung.name for name, rung in self.written.items()},
@@ -452,7 +452,7 @@ class Search:
             raises=tuple(self._raises()),
             refused=tuple(self._refused()),
             pruned=tuple(self._pruned),
-            measured=told,
+            measured=done,
             planned=known,
             status=self._status(raised or kept),
             duration=self.duration,
@@ -509,7 +509,7 @@ class Search:
         )
 
     def _fits(self, candidate: Candidate, room: float) -> bool:
-        """Whether a candidate is within what the reference leaves of the accuracy."""
+        """Whether a candidate fits the accuracy left by the reference."""
         if candidate.verdict == "doubtful":
             return candidate.error <= room
         return room == self.accuracy or estimated_error(candidate) <= room
@@ -543,8 +543,8 @@ class Search:
 
 
 def _best_bet(judged: Sequence[Candidate], reference: Candidate) -> Candidate | None:
-    """Of what is cheaper and not surely off, the cheapest that is sure of little error."""
+    """The cheapest with a small guaranteed error, of those cheaper and not ruled out."""
     open_ = [c for c in judged if c.verdict == "doubtful" and c.cost < reference.cost]
     least = min(map(surely_within, open_), default=math.inf)
-    most = min(SPARED * least, _NO_BOUND)  # bounds of few starts scatter themselves
+    most = min(SPARED * least, _NO_BOUND)  # bounds from few starts scatter themselves
     return min((c for c in open_ if surely_within(c) <= most), key=lambda c: c.cost, default=None)

@@ -1,4 +1,4 @@
-"""Rungs and values of a scene as it is written."""
+"""Rungs and values of a scene as written."""
 
 import math
 from typing import Any
@@ -8,22 +8,22 @@ from ..scene.rungs import Effect, Rung, admissible, with_values
 from ..scene.scene import Scene
 from .ladder import cost_of
 
-_SAME = 1e-9  # of two values
+_SAME = 1e-9  # relative tolerance of equal values
 
 
 def written_rung(effect: Effect, scene: Scene) -> Rung:
-    """Rung of an effect that a scene has as it is written.
+    """Rung of an effect in a scene as written.
 
     Parameters
     ----------
     effect : Effect
-        Of this scene.
+        Effect of this scene.
     scene : Scene
 
     Returns
     -------
     Rung
-        Of the ladder where it has one of the same values, else one that changes nothing.
+        Rung of the ladder with the same values, else one that changes nothing.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def _has(scene: Scene, path: str, value: Any) -> bool:
 
 
 def value_at(scene: Scene, path: str) -> Any:
-    """Value of a scene at a dotted path; None where it has none."""
+    """Value of a scene at a dotted path; None if there is none."""
     node: Any = scene
     for key in path.split("."):
         node = node[int(key)] if isinstance(node, tuple) else getattr(node, key, None)
@@ -55,13 +55,13 @@ def value_at(scene: Scene, path: str) -> Any:
 
 
 def default_step(scene: Scene) -> float | None:
-    """Step that a scene runs with [s]; None of a machine without."""
+    """Step of a scene's run [s]; None for a machine without steps."""
     step = machine_of(scene).step
     return None if step is None else step(scene)
 
 
 def ladder(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
-    """Admissible rungs, the written one among them, cheapest first."""
+    """Admissible rungs, including the scene's own, cheapest first."""
     rungs = list(admissible(effect, scene))
     written = written_rung(effect, scene)
     if written.name not in [rung.name for rung in rungs]:

@@ -1,4 +1,4 @@
-"""What a run gives back: the recording, how the run ended, sensors and the converter.
+"""Results of a run: recording and status; sensors and the converter.
 
-It may import nothing of the house.
+It may import no other module of the package.
 """

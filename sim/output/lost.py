@@ -1,4 +1,4 @@
-"""Samples that were lost: stretches in which a channel stands still though nothing came to rest."""
+"""Lost samples: stretches in which a channel is constant although the machine runs."""
 
 from dataclasses import dataclass
 
@@ -6,22 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 LONG = 64
-"""Samples of a stretch, at least: loggers lose whole blocks."""
+"""Least length of a stretch in samples: loggers lose whole blocks."""
 
-_CUT_OFF = 4  # steps of the converter: a signal that comes to rest does it by its smallest step
-_APART = 0.02  # of the swing: a signal that reaches an extreme by itself has samples next to it
+_CUT_OFF = 4  # steps of the converter: a signal that comes to rest ends in small steps
+_APART = 0.02  # of the swing: an extreme of the signal itself has close samples next to it
 
 
 @dataclass(frozen=True, kw_only=True)
 class LostSamples:
-    """Where a channel stands still.
+    """Stretches in which a channel is constant.
 
     Attributes
     ----------
     count, stretches : int
-        Samples in such stretches, and how many of these there are.
+        Number of samples in such stretches, and number of stretches.
     start, value : int and float
-        First sample of the longest, and what it repeats [unit of the channel].
+        First sample of the longest stretch, and its value [unit of the channel].
     """
 
     count: int
@@ -31,18 +31,18 @@ class LostSamples:
 
 
 def lost_samples(row: NDArray[np.floating]) -> LostSamples | None:
-    """Samples that a recorder lost and filled up with zeros or with the last value.
+    """Find samples that a recorder lost and replaced by zeros or the last value.
 
     Parameters
     ----------
     row : numpy.ndarray [shape=(n_samples,)]
-        A vibration: of a force or a pressure, standing still is no loss.
+        A vibration; a constant force or pressure is no loss.
 
     Returns
     -------
     LostSamples or None
-        None where no value is repeated over 64 samples, where most of such stretches are entered
-        by small steps (a coarse converter between two blows, a machine at rest), and where the
+        None if no value is repeated over 64 samples, if most of such stretches are entered
+        by small steps (a coarse converter between two blows, a machine at rest), and if the
         signal reaches the value by itself at one of its ends (saturation).
 
     Examples
@@ -56,7 +56,7 @@ def lost_samples(row: NDArray[np.floating]) -> LostSamples | None:
     """
     few = row[:: LONG // 2]
     if not (few[1:] == few[:-1]).any():
-        return None  # a long stretch holds two of these, and looking at all is slow
+        return None  # a long stretch has two of these; checking all is slow
     step = np.abs(np.diff(row))
     moves = np.flatnonzero(step)
     edges = np.concatenate([[0], moves + 1, [row.size]])
@@ -65,7 +65,7 @@ def lost_samples(row: NDArray[np.floating]) -> LostSamples | None:
     if not long.size or not moves.size:
         return None
     ends = [end for end in (row.min(), row.max()) if _reached(row, end)]
-    # the first stretch is not entered but left
+    # the first stretch has an end but no entry
     across = step[np.where(long > 0, edges[long], 1 + edges[1]) - 1]
     cut_off = across > _CUT_OFF * step[moves].min()
     lost = long[cut_off & ~np.isin(row[edges[long]], ends)]
@@ -81,6 +81,6 @@ def lost_samples(row: NDArray[np.floating]) -> LostSamples | None:
 
 
 def _reached(row: NDArray[np.floating], end: float) -> bool:
-    """Whether a signal comes near an extreme before it is there."""
+    """Whether a signal has values close to an extreme before it reaches it."""
     apart = np.abs(row - end)
     return bool(((apart > 0) & (apart <= _APART * np.ptp(row))).any())

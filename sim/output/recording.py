@@ -1,4 +1,4 @@
-"""One recording, simulated or measured: the signals and everything needed to interpret them."""
+"""A recording, simulated or measured: signals and all data needed to interpret them."""
 
 import html
 import math
@@ -21,7 +21,7 @@ Origin = Literal["simulated", "measured"]
 
 
 class Table(Protocol):
-    """What a pandas.DataFrame offers; other libraries' tables offer it too."""
+    """Interface of a pandas.DataFrame, which tables of other libraries also have."""
 
     @property
     def columns(self) -> Any:
@@ -32,11 +32,11 @@ class Table(Protocol):
 
 
 class DataError(ValueError):
-    """A data set or recording cannot be used; names quantity, value, bound and cure."""
+    """A data set or recording cannot be used; the message gives quantity, value, bound and cure."""
 
 
 def missing_file(path: Path, cure: str = "check the path") -> str:
-    """Why nothing can be read at a path: it is a folder, there is no such file, or it is none.
+    """Why nothing can be read at a path: it is a folder, missing, or not a file.
 
     Examples
     --------
@@ -52,20 +52,20 @@ def missing_file(path: Path, cure: str = "check the path") -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class SignalLayout:
-    """What the rows of a signal are: sample rate, channels, tacho.
+    """Layout of a signal: sample rate, channels, tacho.
 
     Parameters
     ----------
     sample_rate : float
-        [Hz]
+        Sampling rate [Hz].
     channels : tuple of Channel
         One per row of a signal, names unique.
     tacho : str, optional
         Name of the tacho channel.
     pulses_per_revolution : int
-        Of the tacho.
+        Pulses per revolution of the tacho.
     origin : {"simulated", "measured"}
-        Where the signals are from.
+        Origin of the signals.
 
     Examples
     --------
@@ -82,31 +82,31 @@ class SignalLayout:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of every channel."""
+        """Names of all channels."""
         return tuple(channel.name for channel in self.channels)
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of every channel, by name."""
+        """Units of all channels, by name."""
         return {channel.name: channel.unit for channel in self.channels}
 
     @property
     def vibration_channels(self) -> tuple[Channel, ...]:
-        """Every channel but the tacho."""
+        """All channels except the tacho."""
         return tuple(channel for channel in self.channels if channel.name != self.tacho)
 
     @property
     def vibration_names(self) -> tuple[str, ...]:
-        """Name of every channel but the tacho."""
+        """Names of all channels except the tacho."""
         return tuple(channel.name for channel in self.vibration_channels)
 
     @property
     def vibration_quantities(self) -> tuple[str, ...]:
-        """Quantity of every channel but the tacho."""
+        """Quantities of all channels except the tacho."""
         return tuple(channel.quantity for channel in self.vibration_channels)
 
     def refuse_contradictions(self, where: str) -> None:
-        """Raise DataError where sample rate, channel names or tacho contradict each other."""
+        """Raise DataError if sample rate, channel names or tacho contradict each other."""
         names = list(self.names)
         faults = []
         if fault := rate_fault("sample_rate", self.sample_rate, "give it in Hz"):
@@ -125,23 +125,23 @@ class SignalLayout:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Recording(SignalLayout):
-    """One recording, simulated or measured, with everything needed to interpret it.
+    """A recording, simulated or measured, with all data needed to interpret it.
 
-    What :func:`wearstate.simulate` and :func:`wearstate.read_recording` give, and what features,
-    models, reports and pictures take. Arrays and tables become one by :meth:`from_array`.
+    Returned by :func:`wearstate.simulate` and :func:`wearstate.read_recording`, and accepted by
+    features, models, reports and plots. :meth:`from_array` converts arrays and tables.
 
     Parameters
     ----------
     sample_rate : float
-        In samples a second [Hz].
+        Samples per second [Hz].
     channels : tuple of Channel
         One per row of the signal, names unique.
     tacho : str, optional
         Name of the tacho channel.
     pulses_per_revolution : int
-        Of the tacho.
+        Pulses per revolution of the tacho.
     origin : {"simulated", "measured"}
-        Where the signals are from.
+        Origin of the signals.
     signal : ndarray of shape (n_channels, n_samples)
         Finite, in the unit of each channel; stored as float32.
     row : mapping
@@ -149,24 +149,24 @@ class Recording(SignalLayout):
     source : str
         File or scene, for messages and reports.
     machine : str
-        Identity of the machine, as of :func:`~.file.machines.machine_identities`; empty where
+        Identity of the machine, see :func:`~.file.machines.machine_identities`; empty if
         unknown.
     joined : mapping
-        Further tests of the same machine state, by the name of the view.
+        Further tests of the same machine state, by name of the view.
     status : Status
-        How a simulated run ended; of a measured recording always OK.
+        How a simulated run ended; always OK for a measured recording.
     warnings : tuple of str
-        What a user must know of a run that did not fail.
+        Warnings about a run that did not fail.
     truth : mapping of str to ndarray
-        Quantities that the simulator alone knows, first dimension over `time`; empty unless asked
-        for.
+        Quantities known only to the simulator, with `time` as first dimension; empty unless
+        requested.
     numerics : mapping
         Rungs, step, step count and guards of a simulated run; no wall time.
 
     Raises
     ------
     DataError
-        Shape, sample rate, names or tacho do not fit, or a sample is not finite.
+        Shape, sample rate, names or tacho are inconsistent, or a sample is not finite.
 
     Examples
     --------
@@ -195,7 +195,7 @@ class Recording(SignalLayout):
                 f"({len(self.channels)} channels, >= 1 samples); transpose it or name its channels"
             )
         self.refuse_contradictions(self.source or "recording")
-        with np.errstate(over="ignore"):  # too large for float32 becomes inf, refused below
+        with np.errstate(over="ignore"):  # values too large for float32 become inf, refused below
             object.__setattr__(self, "signal", np.asarray(self.signal, dtype=np.float32))
         _refuse_gaps(self)
 
@@ -211,17 +211,17 @@ class Recording(SignalLayout):
         pulses_per_revolution: int = 1,
         source: str = "",
     ) -> Self:
-        """Recording from an array, or from a table with a column for each channel.
+        """Recording from an array, or from a table with one column per channel.
 
         Parameters
         ----------
         data : array_like of shape (n_channels, n_samples) or (n_samples,), or pandas.DataFrame
-            Signals in SI units. A table has samples down its rows, and its columns name the
+            Signals in SI units. A table has samples in rows, and its columns name the
             channels.
         fs : float
             Sample rate [Hz].
         channels : sequence of str or Channel, optional
-            Names of the rows; of a table, the columns wanted. By default ``ch_0``, ``ch_1``, …, or
+            Names of the rows; for a table, the columns to use. By default ``ch_0``, ``ch_1``, …, or
             all columns.
         unit : str or mapping
             SI unit of all channels, or by name of channel, in any spelling (``m/s²``, ``m/s**2``);
@@ -229,7 +229,7 @@ class Recording(SignalLayout):
         tacho : str, optional
             Name of the tacho channel, in volts unless `unit` says otherwise.
         pulses_per_revolution : int
-            Of the tacho.
+            Pulses per revolution of the tacho.
         source : str
             For messages and reports.
 
@@ -240,8 +240,8 @@ class Recording(SignalLayout):
         Raises
         ------
         DataError
-            The numbers of names and rows differ, a column is missing or holds no numbers, a unit is
-            not known, or as the class itself.
+            The numbers of names and rows differ, a column is missing or not numeric, a unit is
+            unknown, or as for the class itself.
 
         Examples
         --------
@@ -274,13 +274,13 @@ class Recording(SignalLayout):
 
     @property
     def vibration(self) -> NDArray[np.float32]:
-        """Every channel but the tacho [shape=(n_vibration, n_samples)]."""
+        """All channels except the tacho [shape=(n_vibration, n_samples)]."""
         rows = [i for i, name in enumerate(self.names) if name != self.tacho]
         return self.signal[rows]
 
     @property
     def declared_speed_hz(self) -> float | None:
-        """Shaft speed by the manifest: the record's mean, else as set [Hz]; None without one."""
+        """Shaft speed from the manifest: the record's mean, else as set [Hz]; None without one."""
         known = {**self.numerics, **self.row}
         declared = (float(known.get(name, math.nan)) for name in ("mean_speed_hz", "speed_hz"))
         return next((speed for speed in declared if 0 < speed < math.inf), None)
@@ -291,14 +291,14 @@ class Recording(SignalLayout):
         return None if self.tacho is None else self[self.tacho]
 
     def __getitem__(self, name: str) -> NDArray[np.float32]:
-        """Signal of a channel by its name [shape=(n_samples,)]; KeyError names what there is."""
+        """Signal of a channel by its name [shape=(n_samples,)]; KeyError lists the names."""
         if name not in self.names:
             raise KeyError(f"channel {name!r} must be one of {', '.join(self.names)}")
         row: NDArray[np.float32] = self.signal[self.names.index(name)]
         return row
 
     def plot(self, *, ax: Any = None) -> Any:
-        """Draw every channel over time, one axes below the other.
+        """Draw every channel over time, in axes below each other.
 
         Parameters
         ----------
@@ -333,16 +333,16 @@ class Recording(SignalLayout):
         return axes
 
     def __repr__(self) -> str:
-        """Source, length, rate and channels; how the run ended where it failed."""
+        """Source, length, rate and channels; the status of a failed run."""
         return f"<Recording {self._heading}, {' '.join(self.names)}>"
 
     @property
     def _heading(self) -> str:
         rate = self.sample_rate
-        told = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
+        rate_text = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
         name = f"{self.source} " if self.source else ""
         failed = "" if self.status.ok else f", {self.status}"
-        return f"{name}{self.duration:.4g} s, {told}{failed}"
+        return f"{name}{self.duration:.4g} s, {rate_text}{failed}"
 
     def _repr_html_(self) -> str:
         """For notebooks: the channels with quantity, unit and rms about the mean."""
@@ -379,23 +379,23 @@ def as_recording(
     channels: Sequence[str | Channel] | None = None,
     **about: Any,
 ) -> Recording:
-    """A recording as it is; an array or a table as a recording.
+    """Return a recording unchanged; convert an array or a table to one.
 
     Parameters
     ----------
     data : Recording, array_like or pandas.DataFrame
-        As of :meth:`Recording.from_array`.
+        See :meth:`Recording.from_array`.
     fs : float, optional
         Sample rate of an array or a table [Hz]; a recording has its own.
     channels : sequence of str or Channel, optional
-        Of an array or a table; a recording has its own.
+        Channels of an array or a table; a recording has its own.
     **about
-        As of :meth:`Recording.from_array`.
+        See :meth:`Recording.from_array`.
 
     Raises
     ------
     DataError
-        `fs` is missing, or given with a recording, or as :meth:`Recording.from_array`.
+        `fs` is missing, or given with a recording, or as in :meth:`Recording.from_array`.
 
     Examples
     --------
@@ -419,13 +419,13 @@ _QUANTITIES = {
     "Pa": "pressure",
     "V": "voltage",
 }
-"""SI unit -> quantity that it is of."""
+"""SI unit -> its quantity."""
 
 
 def _rows_of(
     data: Any, channels: Sequence[str | Channel] | None, where: str
 ) -> tuple[NDArray[Any], list[str | Channel]]:
-    """Signals channel by channel, and the names or channels of them."""
+    """Signals by channel, and their names or channels."""
     if hasattr(data, "columns") and hasattr(data, "to_numpy"):
         return _columns_of(data, channels, where)
     signal = np.atleast_2d(np.asarray(data))
@@ -468,21 +468,21 @@ def _channels(
             found.append(name)
             continue
         known = unit.get(name) if isinstance(unit, Mapping) else None if name == tacho else unit
-        told = _listed(known or ("V" if name == tacho else ""))
-        if name != tacho and told not in _QUANTITIES:
+        listed = _listed(known or ("V" if name == tacho else ""))
+        if name != tacho and listed not in _QUANTITIES:
             faults.append(
-                f"unit of channel {name!r} = {told!r} must be of {', '.join(_QUANTITIES)}; convert "
-                "it to SI, or give a Channel"
+                f"unit of channel {name!r} = {listed!r} must be of {', '.join(_QUANTITIES)}; "
+                "convert it to SI, or give a Channel"
             )
-        quantity = "tacho" if name == tacho else _QUANTITIES.get(told, "")
-        found.append(Channel(name=name, unit=told, quantity=quantity))
+        quantity = "tacho" if name == tacho else _QUANTITIES.get(listed, "")
+        found.append(Channel(name=name, unit=listed, quantity=quantity))
     if faults:
         raise DataError("\n".join(f"{where}: {fault}" for fault in faults))
     return tuple(found)
 
 
 def _listed(unit: str) -> str:
-    """An SI unit in the spelling of the list; another as it is.
+    """An SI unit in the listed spelling; others unchanged.
 
     Examples
     --------
@@ -502,10 +502,10 @@ def _refuse_gaps(recording: Recording) -> None:
         if bad.size:
             faults.append(
                 f"{recording.source or 'recording'}: channel '{name}' has {bad.size} sample(s) "
-                f"that are not finite, must be 0, first at index {bad[0]}; cut or mend the gap"
+                f"that are not finite, must be 0, first at index {bad[0]}; cut or repair the gap"
             )
     raise DataError("\n".join(faults))
 
 
 Recorder = Callable[[Any, int, bool, bool], Recording]
-"""Makes a recording of a scene: scene, seed, with its truth, error where it fails."""
+"""Makes a recording of a scene: scene, seed, with its truth, raise on failure."""

@@ -1,4 +1,4 @@
-"""What an accelerometer, a tacho and a converter do to a signal."""
+"""Effect of accelerometer, tacho and converter on a signal."""
 
 import math
 from dataclasses import dataclass
@@ -8,28 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 _FORGOTTEN = math.log(1e8)
-"""Time constants after which a transient has sunk to 1e-8, below a 24-bit converter's step."""
+"""Time constants after which a transient has decayed to 1e-8, below a 24-bit converter's step."""
 
 
 RATE_LEAST, RATE_MOST = 1e-3, 1e8
-"""Sample rates believed of a recording [Hz]: a level every quarter of an hour, acoustic emission.
-Beyond them a unit or an exponent has slipped."""
+"""Plausible sample rates of a recording [Hz]: a level every quarter of an hour, acoustic emission.
+Outside, a unit or an exponent is wrong."""
 
 SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST = 1.0, 1e6
 """Sample rates of a simulated recording [Hz]."""
 
 
 def rate_fault(name: str, rate: float, cure: str) -> str:
-    """What is wrong with a sample rate; empty where nothing is.
+    """Fault of a sample rate; empty if there is none.
 
     Parameters
     ----------
     name : str
-        Under which the rate was given.
+        Name of the rate in the message.
     rate : float
-        [Hz]
+        Sampling rate [Hz].
     cure : str
-        What to do.
+        Cure in the message.
 
     Examples
     --------
@@ -43,16 +43,16 @@ def rate_fault(name: str, rate: float, cure: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """One row of a signal: what it is, in which unit, from where.
+    """One row of a signal: name, quantity, unit, place.
 
     Attributes
     ----------
     name, unit, quantity : str
-        The unit is that of the numbers; the quantity is ``acceleration``, ``tacho``, ….
+        The unit of the numbers; the quantity is ``acceleration``, ``tacho``, ….
     place, direction : str
         For the report.
     unit_in_file : str
-        What a measured file declared before conversion; empty for a simulated channel.
+        Unit that a measured file declared before conversion; empty for a simulated channel.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Channel:
 
     @property
     def label(self) -> str:
-        """Name and unit, for people: ``acc [m/s^2]``, or ``gs [m/s^2, g in the file]``."""
+        """Name and unit for display: ``acc [m/s^2]``, or ``gs [m/s^2, g in the file]``."""
         converted = self.unit_in_file not in ("", self.unit)
         return f"{self.name} [{self.unit}{f', {self.unit_in_file} in the file' * converted}]"
 
@@ -82,11 +82,11 @@ def mounting_poles(resonance: float, damping_ratio: float) -> NDArray[np.complex
     Returns
     -------
     numpy.ndarray [shape=(2,)]
-        [rad/s]
+        Poles [rad/s].
 
     Notes
     -----
-    What the sensor shows over what the housing does is ``1 / (1 - r^2 + 2 j zeta r)`` with r the
+    The sensor's reading over the motion of the housing is ``1 / (1 - r^2 + 2 j zeta r)`` with r the
     frequency over the resonance: one below it, ``1 / (2 zeta)`` at it [1]_.
 
     References
@@ -114,14 +114,14 @@ def anti_alias_poles(
     kind : str
         ``butterworth`` (flattest level) or ``bessel`` (flattest delay).
     cutoff : float
-        Where the level has fallen by 3 dB, ``1 / sqrt(2)`` [Hz].
+        Frequency of 3 dB loss, ``1 / sqrt(2)`` [Hz].
     order : int
         1 to 10; the level falls by ``6 order`` dB an octave far above the cut-off.
 
     Returns
     -------
     numpy.ndarray [shape=(order,)]
-        [rad/s]
+        Poles [rad/s].
 
     Examples
     --------
@@ -129,7 +129,7 @@ def anti_alias_poles(
     >>> np.round(level, 6).tolist()
     [1.0, 0.707107]
     """
-    from scipy import signal  # this file is imported wherever a channel is named
+    from scipy import signal  # this module is imported wherever a channel is named
 
     omega = 2 * math.pi * cutoff
     if kind == "bessel":
@@ -142,14 +142,14 @@ def anti_alias_poles(
 def low_pass_response(
     frequency: NDArray[np.float64], poles: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
-    """Frequency response of poles without zeros, one at zero frequency.
+    """Frequency response of poles without zeros, with unit gain at zero frequency.
 
     Parameters
     ----------
     frequency : numpy.ndarray
-        [Hz]
+        Frequencies [Hz].
     poles : numpy.ndarray [shape=(n_poles,)]
-        [rad/s], real parts negative, closed under conjugation.
+        Poles [rad/s], real parts negative, closed under conjugation.
 
     Returns
     -------
@@ -175,18 +175,18 @@ def low_pass(
     Parameters
     ----------
     x : numpy.ndarray [shape=(..., n_samples)]
-        Band-limited below ``fs / 2``; taken to have stood at its first value before it began.
+        Band-limited below ``fs / 2``; assumed constant at its first value before the start.
     fs : float
         Sample rate [Hz].
     poles : numpy.ndarray [shape=(n_poles,)]
-        [rad/s], see :func:`mounting_poles` and :func:`anti_alias_poles`; they may lie above
+        Poles [rad/s], see :func:`mounting_poles` and :func:`anti_alias_poles`; they may lie above
         ``fs / 2``.
 
     Returns
     -------
     numpy.ndarray [shape=(..., n_samples)]
-        Same times. The end does not wrap round to the beginning: the transform is longer by what
-        the slowest pole needs to sink to 1e-8.
+        At the same times. The end does not wrap round to the beginning: the transform is longer by
+        the time in which the slowest pole decays to 1e-8.
 
     Notes
     -----
@@ -211,21 +211,21 @@ def low_pass(
 
 
 def padded_spectrum(x: NDArray[np.float64], pad: int) -> tuple[NDArray[np.complex128], int]:
-    """Spectrum of a record that begins at zero, with room for the tail of a response.
+    """Spectrum of a record that begins at zero, with room for the decay of a response.
 
     Parameters
     ----------
     x : numpy.ndarray [shape=(..., n_samples)]
         First value zero.
     pad : int
-        Samples of the longest response that is to be applied.
+        Length of the longest response to be applied, in samples.
 
     Returns
     -------
     spectrum : numpy.ndarray [shape=(..., length // 2 + 1)]
-        One-sided.
+        One-sided spectrum.
     length : int
-        Samples of the transform, >= ``n_samples + 2 pad``. The last value is led to zero by half
+        Samples of the transform, >= ``n_samples + 2 pad``. The last value is faded to zero by half
         a cosine over the first `pad` of them, so that no step excites the response.
 
     Examples
@@ -252,11 +252,11 @@ def coloured_noise(
     Parameters
     ----------
     n : int
-        Samples.
+        Number of samples.
     fs : float
         Sample rate [Hz].
     rms : float
-        Of the whole band, from one cycle in the record to half the sample rate.
+        rms of the whole band, from one cycle in the record to half the sample rate.
     slope : float
         0 white, 1 pink (flicker noise of amplifiers), 2 red.
     rng : numpy.random.Generator
@@ -264,7 +264,7 @@ def coloured_noise(
     Returns
     -------
     numpy.ndarray [shape=(n,)]
-        In the unit of `rms`; zeros where it is 0.
+        Noise in the unit of `rms`; zeros for `rms` 0.
 
     Examples
     --------
@@ -286,32 +286,32 @@ def coloured_noise(
 
 
 HUM = ((1, 1.0), (2, 0.3), (3, 0.5), (5, 0.25))
-"""Harmonics of mains hum and their amplitudes over the first: a ground loop beside a rectifier
+"""Harmonics of mains hum and their amplitudes over the first: a ground loop next to a rectifier
 (estimate)."""
 
 
 def mains_hum(
     n: int, fs: float, *, rms: float, frequency: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Hum of a mains supply, each harmonic of :data:`HUM` at a phase of its own.
+    """Hum of a mains supply, with a random phase of each harmonic of :data:`HUM`.
 
     Parameters
     ----------
     n : int
-        Samples.
+        Number of samples.
     fs : float
         Sample rate [Hz].
     rms : float
-        Of all harmonics together; those above half the sample rate are left out.
+        rms of all harmonics together; those above half the sample rate are omitted.
     frequency : float
-        Of the first one [Hz].
+        Mains frequency [Hz].
     rng : numpy.random.Generator
-        Of the phases.
+        Source of the phases.
 
     Returns
     -------
     numpy.ndarray [shape=(n,)]
-        In the unit of `rms`.
+        Hum in the unit of `rms`.
 
     Examples
     --------
@@ -327,7 +327,7 @@ def mains_hum(
         if order * frequency < fs / 2
     ]
     orders, sizes, begins = np.array(kept).reshape(-1, 3).T
-    # sin(a + b) of the angle a at the start of each block and b within it: few sines, one product
+    # sin(a + b) with the angle a at the start of each block and b within it: few sines, one product
     starts = np.arange(0, n, _HUM_BLOCK)[:, None]
     turn = math.tau * frequency / fs * orders
     early = turn * starts + begins
@@ -340,34 +340,34 @@ _HUM_BLOCK = 512  # samples
 
 
 class NoisySensor(Protocol):
-    """What a scene tells of a sensor that shows more than the machine, in the sensor's unit."""
+    """Noise data of a sensor in a scene, in the sensor's unit."""
 
     @property
     def noise(self) -> float:
-        """Rms of its own."""
+        """Rms of the sensor's own noise."""
         ...
 
     @property
     def mains(self) -> float:
-        """Rms of hum, harmonics and all."""
+        """Rms of mains hum with harmonics."""
         ...
 
     @property
     def mains_frequency(self) -> float:
-        """Of the hum [Hz]."""
+        """Mains frequency [Hz]."""
         ...
 
 
 def floor_of(
     sensor: NoisySensor, n: int, fs: float, *, slope: float = 0.0, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """What a sensor shows of a machine at rest: its own noise and the hum of the mains.
+    """Reading of a sensor on a machine at rest: its own noise and mains hum.
 
     Parameters
     ----------
     sensor : NoisySensor
     n : int
-        Samples.
+        Number of samples.
     fs : float
         Sample rate [Hz].
     slope : float
@@ -377,7 +377,7 @@ def floor_of(
     Returns
     -------
     numpy.ndarray [shape=(n,)]
-        In the sensor's unit.
+        Noise in the sensor's unit.
 
     Examples
     --------
@@ -447,15 +447,15 @@ def tacho_pulses(
 ) -> NDArray[np.float32]:
     """Rectangular tacho pulses, rising at every whole revolution.
 
-    Each sample holds the mean over the interval round it, half-way to either neighbour, so that a
-    reader can interpolate an edge to a fraction of a sample, and finds it where it is.
+    Each sample holds the mean over the interval around it, half-way to either neighbour, so that
+    an edge can be interpolated exactly to a fraction of a sample.
 
     Parameters
     ----------
     revolutions : numpy.ndarray [shape=(n_samples,)]
         Shaft angle in revolutions at each sample, rising.
     pulse_width : float
-        [rev]
+        Width of a pulse [rev].
     level : float
         Height of a pulse [V].
 
@@ -469,7 +469,7 @@ def tacho_pulses(
     >>> tacho_pulses(np.array([-0.2, 0.0, 0.2]), pulse_width=0.5, level=4.0)
     array([0., 2., 4.], dtype=float32)
     """
-    # integral of the pulse train over angle: whole pulses passed, and the part of the present one
+    # integral of the pulse train over angle: complete pulses, and the part of the present one
     inner = (revolutions[1:] + revolutions[:-1]) / 2
     ends = 2 * revolutions[[0, -1]] - inner[[0, -1]]
     border = np.concatenate([ends[:1], inner, ends[1:]])

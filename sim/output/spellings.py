@@ -1,4 +1,4 @@
-"""Every way to write a unit."""
+"""Spellings of units."""
 
 import re
 from functools import lru_cache
@@ -11,7 +11,7 @@ _ALSO = {
     "deg": ("°",),
     "L": ("l",),
 }
-"""Other names of a unit, of one meaning only: 1/s is none, as it may be rev/s or rad/s."""
+"""Other names of a unit with a unique meaning; not 1/s, which may be rev/s or rad/s."""
 
 _WAYS = {
     " ": r"\s*[*·⋅.-]?\s*",
@@ -22,14 +22,14 @@ _WAYS = {
     "^": r"(?:\^|\*\*)?",
     "u": "[uµμ]",
 }
-"""Every way to write a sign of a unit, as a regular expression."""
+"""Spellings of each symbol in a unit, as regular expressions."""
 
 _SIGN = re.compile(r"( |/|\^[23]|\^-1|\^|\bu(?=[ms]\b))")
 
 
 @lru_cache(maxsize=256)
 def spellings(unit: str) -> str:
-    """Regular expression of every spelling of a unit, for Python and for JSON schemas.
+    """Regular expression of all spellings of a unit, for Python and for JSON schemas.
 
     Examples
     --------

@@ -1,28 +1,28 @@
-"""How a run ended, and what helps where it failed. Knows no physics."""
+"""How a run ended, with the cure of a failure; independent of the physics."""
 
 from enum import IntEnum
 from typing import Self
 
 
 class Ending(IntEnum):
-    """How something ended: a code, zero where it can be used, and a sentence with the cure."""
+    """How something ended: a code, zero if the result is usable, and a sentence with the cure."""
 
     text: str
 
     def __new__(cls, code: int, text: str = "") -> Self:
-        """A member; of its code alone, for the look-up."""
+        """Create a member; from its code alone, for the look-up."""
         member = int.__new__(cls, code)
         member._value_, member.text = code, text
         return member
 
     @property
     def ok(self) -> bool:
-        """Whether it ended as wanted."""
+        """Whether it ended without failure."""
         return self == 0
 
 
 class Status(Ending):
-    """How a run ended. Everything but OK carries a cure."""
+    """How a run ended. Every status except OK includes a cure."""
 
     OK = 0, "done"
     DIVERGED = 1, "the state is no longer finite; shorten numerics.step"
@@ -31,10 +31,10 @@ class Status(Ending):
         "a joint's penetration exceeds a tenth of its pin radius, beyond the contact law; "
         "raise joint.crankpin.stiffness or lower the speed",
     )
-    LOCKED = 3, "the rod stands across the stroke; lengthen rod.length or lower the clearance"
+    LOCKED = 3, "the rod is perpendicular to the stroke; lengthen rod.length or lower the clearance"
     CHAMBER = (
         4,
-        "the cylinder pressure left all bounds, or the piston took up the whole chamber; "
+        "the cylinder pressure left all bounds, or the piston filled the whole chamber; "
         "raise pressure.dead_volume or shorten numerics.step",
     )
     STEP = (
@@ -49,9 +49,9 @@ class Status(Ending):
     )
     VAPOUR = (
         7,
-        "the pressure falls below that of the vapour, which the rung 'heads' does not know; "
-        "set pressure.rung = 'chamber', shorten the suction line, or lower the speed; where only "
-        "knocks do it, pressure.flow = 'two-harmonic' feels none",
+        "the pressure falls below the vapour pressure, which the rung 'heads' does not model; "
+        "set pressure.rung = 'chamber', shorten the suction line, or lower the speed; if only "
+        "knocks cause it, set pressure.flow = 'two-harmonic'",
     )
     VALVE_OPEN = (
         8,
@@ -70,7 +70,7 @@ class Status(Ending):
     )
     OVERLOAD = (
         11,
-        "no film of this bearing carries the load that rests on the journal; lower load.static, or "
+        "the steady load on the journal exceeds the capacity of its film; lower load.static, or "
         "raise speed, oil.viscosity or bearing.length",
     )
     TOUCH = (
@@ -90,11 +90,12 @@ class Status(Ending):
     )
     TOO_MANY_STEPS = (
         15,
-        "the adaptive integrator used up its steps; raise numerics.tolerance or shorten duration",
+        "the adaptive integrator reached its limit of steps; raise numerics.tolerance, or shorten "
+        "duration",
     )
     LINE_OVERLOAD = (
         16,
-        "the film of a bearing cannot carry what the line puts on it; lower the bearing's offset, "
+        "the film of a bearing cannot carry its load from the line; lower the bearing's offset, "
         "or raise oil viscosity, speed or the bearing's length",
     )
     LINE_EDGE = (
@@ -104,8 +105,8 @@ class Status(Ending):
     )
     LINE_BALANCE = (
         18,
-        "shaft and oil films found no balance; bring the offsets nearer to a fair line, or raise "
-        "film.n_theta and film.n_z",
+        "shaft and oil films found no equilibrium; bring the offsets nearer to a fair line, or "
+        "raise film.n_theta and film.n_z",
     )
     LINE_COARSE = (
         19,
@@ -114,7 +115,7 @@ class Status(Ending):
     )
     LINE_MOTION = (
         20,
-        "the journal would move by more than its film is thick, beyond the linear response; lower "
+        "the journal would move by more than its film thickness, beyond the linear response; lower "
         "unbalance, blade_rate or turbulence",
     )
     LINE_UNSTABLE = (
@@ -134,15 +135,15 @@ class Status(Ending):
         Examples
         --------
         >>> print(Status.TOO_MANY_STEPS)
-        too many steps: the adaptive integrator used up its steps; raise numerics.tolerance or \
-shorten duration
+        too many steps: the adaptive integrator reached its limit of steps; raise \
+numerics.tolerance, or shorten duration
         """
         name = self.name.lower().replace("_", " ")
         return name if self.ok else f"{name}: {self.text}"
 
 
 class SimulationError(RuntimeError):
-    """A run ended in a status other than OK and the caller asked to be told so."""
+    """A run failed, and the caller asked for an error."""
 
     def __init__(self, status: Status, where: str) -> None:
         self.status = status

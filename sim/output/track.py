@@ -1,4 +1,4 @@
-"""What a proximity probe reads of a perfectly still shaft: the track that turns below it."""
+"""Run-out of a proximity probe: the reading for a perfectly still shaft as its track rotates."""
 
 import math
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class _Hollow(Protocol):
 
 
 def track_under(lobes: Sequence[_Lobes], dents: Sequence[_Hollow], turned: Float) -> Float:
-    """What the track adds to the reading of a probe.
+    """Run-out in the reading of a probe.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def track_under(lobes: Sequence[_Lobes], dents: Sequence[_Hollow], turned: Float
     dents : sequence of Dent
         Depth [m], width [rad] and angle from the keyphasor mark in the direction of rotation [rad].
     turned : ndarray of shape (n,)
-        Angle of the shaft less that of the probe [rad].
+        Angle of the shaft minus that of the probe [rad].
 
     Returns
     -------
     ndarray of shape (n,)
-        Towards the probe [m]; a dent is away from it.
+        Run-out towards the probe [m]; a dent is away from it.
     """
     total = np.zeros(len(turned))
     for lobe in lobes:
@@ -54,7 +54,7 @@ def track_under(lobes: Sequence[_Lobes], dents: Sequence[_Hollow], turned: Float
 
 
 def _raised_cosine(angle: Float, width: float) -> Float:
-    """1 in the middle of a dent, 0 from its edges on; smooth, as a probe averages over its tip."""
+    """1 in the middle of a dent, 0 beyond its edges; smooth, as a probe averages over its tip."""
     away = np.abs(np.remainder(angle + math.pi, 2 * math.pi) - math.pi)
     inside = away < width / 2
     return np.where(inside, 0.5 + 0.5 * np.cos(2 * math.pi * away / width), 0.0)

@@ -1,4 +1,4 @@
-"""Transfer functions from places that are pushed to sensors."""
+"""Transfer functions from places of forces to sensors."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class SceneTransfer:
-    """Accelerance from places that are pushed to accelerometers.
+    """Accelerance from places of forces to accelerometers.
 
     Attributes
     ----------
     frequency : ndarray, shape (n_lines,)
-        [Hz]
+        Frequencies [Hz].
     sensors, places : tuple of str
     values : ndarray, shape (n_sensors, n_places, n_lines)
-        Complex, ``exp(+j w t)`` [(m/s^2)/N].
+        Accelerance, complex, ``exp(+j w t)`` [(m/s^2)/N].
     """
 
     frequency: NDArray[np.float64]

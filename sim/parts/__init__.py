@@ -1,4 +1,4 @@
-"""Parts of scenes: quantities with units, limits, errors in words, casing, sensors, oil.
+"""Parts of scenes: quantities with units, limits, error messages, casing, sensors, oil.
 
 It may import ``sim.brief``, ``sim.output``.
 """

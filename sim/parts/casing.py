@@ -1,4 +1,4 @@
-"""The casing on its mounts: as modes, or as measured frequency response functions."""
+"""The casing on its mounts, as modes or as measured frequency response functions."""
 
 import math
 from collections.abc import Container, Mapping
@@ -11,26 +11,28 @@ from .dimensions import Frequency, Length, ModeShape, Ratio
 from .limits import MODE_FASTEST, MODE_SLOWEST, MOST_MODES
 from .part import FixedTable, Part
 
-_DAMPED_MOST = 0.99  # of a mode that swings still
+_DAMPED_MOST = 0.99  # of an underdamped mode
 
 
 class CasingMode(Part):
     """One mode of the casing: mass-normalised shape at every force and sensor place."""
 
-    frequency: Frequency = Field(ge=MODE_SLOWEST, le=MODE_FASTEST, description="natural, undamped")
-    damping_ratio: Ratio = Field(gt=0, lt=1, description="over the critical one")
+    frequency: Frequency = Field(
+        ge=MODE_SLOWEST, le=MODE_FASTEST, description="undamped natural frequency"
+    )
+    damping_ratio: Ratio = Field(gt=0, lt=1, description="damping over critical damping")
     shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(
         min_length=1, description="place or sensor -> mass-normalised deflection"
     )
     foot_share: Ratio = Field(
-        default=0.0, ge=0, le=1, description="of its strain energy, in the feet as tightened"
+        default=0.0, ge=0, le=1, description="share of its strain energy in the feet as tightened"
     )
 
     def on_feet(self, stiffness_ratio: float) -> tuple[float, float]:
-        """Frequency [Hz] and damping ratio where the feet keep this share of their stiffness.
+        """Frequency [Hz] and damping ratio if the feet keep this share of their stiffness.
 
-        By Rayleigh's quotient with the shape as it was: the stiffness of the mode falls by its
-        share in the feet, mass and dashpots stay.
+        By Rayleigh's quotient with the original shape: the stiffness of the mode falls by its
+        share in the feet; mass and dashpots stay.
         """
         lower = math.sqrt(1 - self.foot_share * (1 - stiffness_ratio))
         return self.frequency * lower, min(self.damping_ratio / lower, _DAMPED_MOST)
@@ -39,32 +41,39 @@ class CasingMode(Part):
 class FrfFile(Part):
     """Measured accelerance of the casing, in a file; see :mod:`wearstate.sim.casing.casing_frf`.
 
-    ``folder`` is where a relative file is looked for first; :func:`beside` sets it to that of the
-    scene file. It is no part of the scene's dump, which must not name a machine's folders.
+    A relative file is searched first in ``folder``, which :func:`with_folder` sets to that of the
+    scene file. It is excluded from the scene's dump, which must not contain a computer's paths.
     """
 
     file: str = Field(min_length=1, description="CSV or UFF58, accelerance in m/s^2/N")
     pairs: Annotated[dict[str, Annotated[str, Field(min_length=1)]], AfterValidator(FixedTable)] = (
-        Field(default=FixedTable({}), description="sensor/place -> the name of it in the file")
+        Field(default=FixedTable({}), description="sensor/place -> name in the file")
     )
     without: tuple[str, ...] = Field(
-        default=(), description="places the file does not have, whose forces stay silent"
+        default=(), description="places missing in the file, whose forces are ignored"
     )
-    folder: str = Field(default="", exclude=True, description="where the file is looked for first")
+    folder: str = Field(default="", exclude=True, description="folder searched first")
 
 
 class Feet(Part):
-    """Feet on anchor bolts, whose contact is as stiff as it is pressed.
+    """Feet on anchor bolts, whose contact stiffness is proportional to the bolt force.
 
     The stiffness of rough surfaces in contact is proportional to the load (Greenwood, Williamson
     1966, doi:10.1098/rspa.1966.0242; Persson 2007, doi:10.1103/PhysRevLett.99.125502), and the load
-    to the stretch that the bolts still have. The contact is in series with the rest of the feet.
+    to the remaining stretch of the bolts. The contact is in series with the rest of the feet.
     """
 
-    bolt_stretch: Length = Field(gt=0, le=0.1, description="of the anchor bolts, as tightened")
-    stretch_lost: Length = Field(default=0.0, ge=0, description="of it, by settling and turning")
+    bolt_stretch: Length = Field(
+        gt=0, le=0.1, description="stretch of the anchor bolts as tightened"
+    )
+    stretch_lost: Length = Field(
+        default=0.0, ge=0, description="loss of stretch by settling and loosening"
+    )
     contact_share: Ratio = Field(
-        default=0.2, gt=0, lt=1, description="of the feet's flexibility, in their contact as new"
+        default=0.2,
+        gt=0,
+        lt=1,
+        description="share of the new feet's flexibility that is in their contact",
     )
 
     @model_validator(mode="after")
@@ -72,27 +81,26 @@ class Feet(Part):
         if self.stretch_lost >= self.bolt_stretch:
             raise ValueError(
                 f"stretch_lost = {self.stretch_lost:g} m must be < bolt_stretch = "
-                f"{self.bolt_stretch:g} m; a foot without any load rattles, which this model does "
-                "not know"
+                f"{self.bolt_stretch:g} m; the model does not cover a loose foot, which "
+                "rattles"
             )
         return self
 
     @property
     def stiffness_ratio(self) -> float:
-        """Of the feet, over that as tightened: 0 to 1 [-]."""
+        """Stiffness of the feet over that as tightened: 0 to 1 [-]."""
         left = 1 - self.stretch_lost / self.bolt_stretch
         return 1 / (1 - self.contact_share + self.contact_share / left)
 
 
 class Casing(Part):
-    """The pump casing on its mounts: as modes, or as measured frequency response functions."""
+    """The pump casing on its mounts, as modes or as measured frequency response functions."""
 
     rung: Literal["driven", "yielding"] = Field(
         default="driven",
-        description="driven: the crank turns in a bearing at rest; yielding: in one that moves "
-        "with the casing",
+        description="driven: the crank's bearing is at rest; yielding: it moves with the casing",
     )
-    feet: Feet | None = Field(default=None, description="that may work loose; none: tight")
+    feet: Feet | None = Field(default=None, description="feet that may work loose; none: tight")
     modes: tuple[CasingMode, ...] = Field(default=(), max_length=MOST_MODES)
     frf: FrfFile | None = None
 
@@ -107,22 +115,22 @@ class Casing(Part):
         if self.rung == "yielding" and not self.modes:
             raise ValueError(
                 "rung = 'yielding' must have casing.modes: a measured casing has no shape at the "
-                "bearing; take 'driven', or fit modes to the measurement"
+                "bearing; set 'driven', or fit modes to the measurement"
             )
         if self.feet is not None and not any(mode.foot_share for mode in self.modes):
             raise ValueError(
-                "feet needs modes of which one has foot_share > 0; what feet do to a measured "
-                "casing is in the measurement"
+                "feet needs modes of which one has foot_share > 0; the measurement of a "
+                "casing includes its feet"
             )
         return self
 
 
-def beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Scene table whose files are looked for in this folder first, that of the scene file.
+def with_folder(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Scene table whose files are searched first in this folder, that of the scene file.
 
     Examples
     --------
-    >>> beside({"casing": {"frf": {"file": "pump.csv"}}}, Path("scenes"))["casing"]["frf"]
+    >>> with_folder({"casing": {"frf": {"file": "pump.csv"}}}, Path("scenes"))["casing"]["frf"]
     {'folder': 'scenes', 'file': 'pump.csv'}
     """
     result = dict(table)
@@ -138,16 +146,16 @@ _FILES = (("casing", "frf"), ("load", "record"))
 
 
 def specific_key(keys: Container[str], place: str, throw: int) -> str | None:
-    """Key for a force: ``place_throw`` where there is one, else ``place``, else None.
+    """Key for a force: ``place_throw`` if there is one, else ``place``, else None.
 
     Parameters
     ----------
     keys : container of str
         Keys of a mode shape, or places of a frequency response table.
     place : str
-        Where the force acts.
+        Place of the force.
     throw : int
-        Of which throw it is, counted from 1.
+        Throw of the force, counted from 1.
 
     Examples
     --------

@@ -27,12 +27,12 @@ class Dimension:
 
     @property
     def unit(self) -> str:
-        """SI unit, that of a bare number; empty for a ratio."""
+        """SI unit, assumed for a bare number; empty for a ratio."""
         return unit_symbol(self.name)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Every unit that a string may carry, as listed, the SI unit first."""
+        """All units that a string may have, the SI unit first."""
         return tuple(UNITS[self.name])
 
     def __get_pydantic_json_schema__(
@@ -45,7 +45,7 @@ class Dimension:
 
 
 def _parser(dimension: str) -> BeforeValidator:
-    def parse(value: Any) -> float:  # a hundred floats a scene: no call for what is SI already
+    def parse(value: Any) -> float:  # called a hundred times per scene: fast path for SI values
         return value if type(value) is float else to_si(value, dimension)
 
     return BeforeValidator(parse)
@@ -61,7 +61,7 @@ Pressure = Annotated[float, _parser("pressure"), Dimension("pressure")]
 Acceleration = Annotated[float, _parser("acceleration"), Dimension("acceleration")]
 Gravity = Annotated[
     float,
-    Field(ge=0, le=GRAVITY_MOST, description="0 where weight does not act across the shaft"),
+    Field(ge=0, le=GRAVITY_MOST, description="gravity; 0 if weight does not act across the shaft"),
     _parser("acceleration"),
     Dimension("acceleration"),
 ]

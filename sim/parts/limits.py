@@ -1,6 +1,6 @@
-"""Limits of what a scene may hold: beyond them a number is a slip of a unit or of a key."""
+"""Limits of scene values: beyond them a number has a wrong unit or is in the wrong key."""
 
-# Bounds no machine comes near: they catch a wrong unit or a slipped exponent, and keep every
+# Bounds far from any machine: they catch a wrong unit or exponent, and keep every
 # product and quotient of the kernels finite.
 LONGEST = 100.0  # m
 HEAVIEST, LIGHTEST = 1e6, 1e-6  # kg

@@ -1,4 +1,4 @@
-"""Oil: what a film runs in, and the film of a pin in its eye."""
+"""Oil of a film, and of the film between a pin and its eye."""
 
 from typing import Self
 
@@ -23,32 +23,37 @@ from .part import Part
 _VISCOSITY_LEAST, _VISCOSITY_MOST = 1e-6, 1e4  # Pa s, from air to pitch
 _CONDUCTANCE_MOST = 1e4  # W/K, a water-cooled housing has hundreds
 _FLOW_MOST = 1.0  # m^3/s, a turbine's bearing takes a hundredth
-_FORTY, _HUNDRED = 313.15, 373.15  # K, where data sheets give viscosities
+_FORTY, _HUNDRED = 313.15, 373.15  # K, temperatures of the viscosities in data sheets
 
 
 class Oil(Part):
-    """The oil in the film, at the temperature at which it runs.
+    """The oil in the film, at its operating temperature.
 
-    Give its viscosity, or its temperature with the two kinematic viscosities of its data sheet
-    and its density: Walther's law (ASTM D341) then gives the viscosity.
+    Give its viscosity, or its temperature with the density and the two kinematic viscosities of
+    its data sheet: Walther's law (ASTM D341) then gives the viscosity.
     """
 
     viscosity: Viscosity | None = Field(
         default=None,
         ge=_VISCOSITY_LEAST,
         le=_VISCOSITY_MOST,
-        description="dynamic, in the film",
+        description="dynamic viscosity in the film",
     )
     temperature: Temperature | None = Field(
-        default=None, ge=200, le=600, description="absolute: 50 degrees Celsius are 323.15 K"
+        default=None,
+        ge=200,
+        le=600,
+        description="absolute temperature: 50 degrees Celsius are 323.15 K",
     )
     viscosity_40: KinematicViscosity | None = Field(
-        default=None, ge=2e-6, le=1e-1, description="kinematic, at 40 degrees Celsius"
+        default=None, ge=2e-6, le=1e-1, description="kinematic viscosity at 40 degrees Celsius"
     )
     viscosity_100: KinematicViscosity | None = Field(
-        default=None, ge=2e-6, le=1e-1, description="kinematic, at 100 degrees Celsius"
+        default=None, ge=2e-6, le=1e-1, description="kinematic viscosity at 100 degrees Celsius"
     )
-    density: Density | None = Field(default=None, ge=500, le=2000, description="in the film")
+    density: Density | None = Field(
+        default=None, ge=500, le=2000, description="density in the film"
+    )
 
     @model_validator(mode="after")
     def _one_way_to_know_it(self) -> Self:
@@ -77,19 +82,19 @@ class Oil(Part):
 
     @property
     def dynamic_viscosity(self) -> float:
-        """In the film [Pa s], as given or by Walther's law."""
+        """Dynamic viscosity in the film [Pa s], as given or by Walther's law."""
         if self.viscosity is not None:
             return self.viscosity
-        assert self.temperature is not None  # the validator saw to it that all four are given
+        assert self.temperature is not None  # the validator ensures that all four are given
         return self.viscosity_at(self.temperature)
 
     def warmed(self, kelvin: float) -> float:
-        """Dynamic viscosity in a film that is warmer by that much [Pa s].
+        """Dynamic viscosity in a film warmer by a difference [Pa s].
 
         Parameters
         ----------
         kelvin : float
-            [K]; other than zero only where the oil's temperature is given.
+            Temperature difference [K]; non-zero only if the oil's temperature is given.
 
         Examples
         --------
@@ -99,11 +104,11 @@ class Oil(Part):
         """
         if kelvin == 0:
             return self.dynamic_viscosity
-        assert self.temperature is not None  # the scene's check saw to it
+        assert self.temperature is not None  # ensured by the scene's check
         return self.viscosity_at(self.temperature + kelvin)
 
     def thickened(self, ratio: float) -> Self:
-        """An oil of so many times the viscosity at every temperature.
+        """Oil with its viscosity multiplied by a ratio at every temperature.
 
         Parameters
         ----------
@@ -117,7 +122,7 @@ class Oil(Part):
         if self.viscosity is not None:
             return self.model_copy(update={"viscosity": self.viscosity * ratio})
         assert self.density is not None
-        # Walther's law is of the kinematic viscosity: the density takes any ratio, exactly
+        # Walther's law is for the kinematic viscosity: scaling the density is exact for any ratio
         return self.model_copy(update={"density": self.density * ratio})
 
     def viscosity_at(self, temperature: float) -> float:
@@ -126,12 +131,12 @@ class Oil(Part):
         Parameters
         ----------
         temperature : float
-            Absolute [K].
+            Absolute temperature [K].
 
         Raises
         ------
         ValueError
-            The temperature is outside what the law knows.
+            The temperature is outside the range of the law.
         """
         assert self.viscosity_40 is not None
         assert self.viscosity_100 is not None
@@ -141,14 +146,14 @@ class Oil(Part):
 
 
 class JointOil(Oil):
-    """The oil between a pin and its eye, and the rough surfaces that it keeps apart."""
+    """Oil between a pin and its eye, and the rough surfaces it separates."""
 
-    length: Length = Field(gt=0, le=LONGEST, description="of the eye, along the pin")
+    length: Length = Field(gt=0, le=LONGEST, description="length of the eye along the pin")
     groove_width: Length = Field(
         default=0.0,
         ge=0,
         le=LONGEST,
-        description="of a groove all round in the middle: two lands are left; 0 is none",
+        description="width of a circumferential groove in the middle, leaving two lands; 0: none",
     )
     filled_gap: Length | None = Field(
         default=None,
@@ -160,29 +165,29 @@ class JointOil(Oil):
         default=None,
         ge=0,
         le=DAMPING_MOST,
-        description="of the parts behind the film; none: a tenth of sqrt(stiffness x mass)",
+        description="damping of the parts behind the film; none: a tenth of sqrt(stiffness x mass)",
     )
     conductance: HeatConductance | None = Field(
         default=None,
         gt=0,
         le=_CONDUCTANCE_MOST,
-        description="of heat from the film to what is at `temperature`; with it, or with a flow, "
-        "the film runs warmer by its friction, and is thinner",
+        description="heat conductance from the film to surroundings at `temperature`; with it, or "
+        "with a flow, friction heats the film and thins it",
     )
     flow: VolumeFlow | None = Field(
         default=None,
         gt=0,
         le=_FLOW_MOST,
-        description="of oil through the film, fed at `temperature`; it carries heat away",
+        description="flow of oil through the film, fed at `temperature`; it carries heat away",
     )
     specific_heat: SpecificHeat = Field(
-        default=2000.0, ge=500, le=10_000, description="of the oil that flows through"
+        default=2000.0, ge=500, le=10_000, description="specific heat of that flow"
     )
     roughness: Length | None = Field(
         default=None,
         gt=0,
         le=1e-4,
-        description="of both surfaces, root of the sum of their squares; the rung mixed needs it",
+        description="combined roughness of both surfaces (root of summed squares), rung mixed",
     )
     asperity_stiffness: Pressure = Field(
         default=160e6,
@@ -193,9 +198,9 @@ class JointOil(Oil):
 
     @property
     def carried_per_kelvin(self) -> float:
-        """Heat carried away for each kelvin above `temperature` [W/K]; 0 where none is asked for.
+        """Heat carried away per kelvin above `temperature` [W/K]; 0 without a heat balance.
 
-        That of the flow, density x specific heat x flow, and of the metal.
+        By the flow, density x specific heat x flow, and by the metal.
         """
         flow = (self.flow or 0.0) * (self.density or 0.0) * self.specific_heat
         return flow + (self.conductance or 0.0)
@@ -209,7 +214,7 @@ class JointOil(Oil):
         if self.viscosity is not None:
             faults.append(
                 f"viscosity = {self.viscosity:g} Pa s with {' and '.join(asked)}: a film that "
-                "warms needs temperature, viscosity_40, viscosity_100, density instead"
+                "heats up needs temperature, viscosity_40, viscosity_100, density instead"
             )
         if self.filled_gap is not None:
             faults.append(

@@ -4,24 +4,24 @@ import math
 from collections.abc import Sequence
 
 _WALTHER_SHIFT = 0.7  # mm^2/s, ASTM D341
-_WALTHER_LEAST = 2.0  # mm^2/s; below, ASTM D341 adds terms
+_WALTHER_LEAST = 2.0  # mm^2/s; below, ASTM D341 has additional terms
 _SQUARE_MILLIMETRE = 1e-6  # m^2
 
 
 def walther_viscosity(
     temperature: float, points: Sequence[tuple[float, float]], *, density: float
 ) -> float:
-    """Dynamic viscosity of a mineral oil known at two temperatures [Pa s].
+    """Dynamic viscosity of a mineral oil from values at two temperatures [Pa s].
 
     Parameters
     ----------
     temperature : float
-        Absolute [K].
+        Absolute temperature [K].
     points : sequence of two (float, float)
         Temperatures [K] and kinematic viscosities there [m^2/s], as a data sheet gives them for
         40 and 100 degrees Celsius.
     density : float
-        At the temperature asked for [kg/m^3].
+        Density at `temperature` [kg/m^3].
 
     Returns
     -------
@@ -30,8 +30,8 @@ def walther_viscosity(
     Raises
     ------
     ValueError
-        A value is out of range, the two temperatures are one, or the kinematic viscosity asked
-        for or given is below 2 mm^2/s, where this form ends.
+        A value is out of range, the two temperatures are equal, or a kinematic viscosity, given or
+        resulting, is below 2 mm^2/s, the limit of this form.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""A part: frozen fields, unknown keys refused; and tables of them."""
+"""Base of scene parts: frozen fields, unknown keys refused; and frozen tables."""
 
 from collections.abc import Mapping
 from typing import Any, Generic, TypeVar
@@ -9,7 +9,7 @@ Value = TypeVar("Value")
 
 
 class FixedTable(dict[str, Value], Generic[Value]):
-    """A table of plain values that refuses to change; hashable, picklable, and a dict to dump.
+    """An immutable table of plain values: hashable, picklable, and dumped as a dict.
 
     Examples
     --------
@@ -45,12 +45,12 @@ _TWINS = {
 
 
 def without_twin(table: dict[str, Any], key: str) -> None:
-    """Remove the other clearance of a joint, or speed of a motor, about to be given one."""
+    """Remove the alternative to a joint's clearance or motor's speed that is about to be given."""
     table.pop(_TWINS.get(key, ""), None)
 
 
 def merged(base: Any, over: Any) -> Any:
-    """Table `over` upon table `base`, at any depth.
+    """Merge table `over` into table `base`, at any depth.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Accelerometer and tacho: what they measure, their noise, range and filters."""
+"""Accelerometer and tacho: their channels, noise, range and filters."""
 
 import math
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ _ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor end
 
 _LEVEL_LEAST, _LEVEL_MOST = 1e-3, 1e4  # V
 
-_FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no signal is left
+_FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no signal passes
 _FILTER_STEEPEST = 10  # order; eight is usual
 
-_DAMPING_LEAST = 1e-3  # glued steel has some 0.01
+_DAMPING_LEAST = 1e-3  # glued steel has about 0.01
 
 AXES = {"x": "along the stroke", "y": "across the stroke", "z": "along the shaft"}
 """Axes of a triaxial accelerometer, in the frame of the machine."""
@@ -29,16 +29,16 @@ AXES = {"x": "along the stroke", "y": "across the stroke", "z": "along the shaft
 class Accelerometer(Part):
     """An accelerometer with its mounting, its filter and its converter.
 
-    With ``axes`` it is a triaxial one: channels ``name_x``, ``name_y``, …, see
+    With ``axes`` it is triaxial, with channels ``name_x``, ``name_y``, …, see
     :func:`single_axis`.
     """
 
-    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="of its channel")
+    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="channel name")
     axes: tuple[Literal["x", "y", "z"], ...] = Field(
         default=(), max_length=3, description="one channel for each; none: a single axis"
     )
-    place: str = Field(default="", description="where it sits, for the report")
-    direction: str = Field(default="", description="which way it points, for the report")
+    place: str = Field(default="", description="location, for the report")
+    direction: str = Field(default="", description="direction, for the report")
     gain: Ratio = Field(
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
@@ -49,33 +49,36 @@ class Accelerometer(Part):
         default=0.0,
         ge=0,
         le=2,
-        description="its power falls as 1 / f to this power: 0 white, 1 pink, 2 red",
+        description="exponent n of a noise power ~ 1 / f^n: 0 white, 1 pink, 2 red",
     )
     mains: Acceleration = Field(
-        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of hum, harmonics and all"
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of mains hum with harmonics"
     )
-    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="mains frequency")
     range: Acceleration = Field(
         ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
     )
-    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
     mounting_resonance: Frequency | None = Field(
-        default=None, ge=_FILTER_SLOWEST, le=MODE_FASTEST, description="of sensor on its mount"
+        default=None,
+        ge=_FILTER_SLOWEST,
+        le=MODE_FASTEST,
+        description="resonance of the sensor on its mount",
     )
     mounting_damping: Ratio | None = Field(
-        default=None, ge=_DAMPING_LEAST, lt=1, description="ratio to the critical one"
+        default=None, ge=_DAMPING_LEAST, lt=1, description="damping over critical damping"
     )
     anti_alias: Literal["none", "butterworth", "bessel"] = Field(
-        default="none", description="none: what decimation does, flat to 0.45 of the rate"
+        default="none", description="filter; none: decimation only, flat to 0.45 of the rate"
     )
     anti_alias_cutoff: Frequency | None = Field(
-        default=None, ge=_FILTER_SLOWEST, le=MODE_FASTEST, description="where 3 dB are lost"
+        default=None, ge=_FILTER_SLOWEST, le=MODE_FASTEST, description="frequency of 3 dB loss"
     )
     anti_alias_order: int | None = Field(
         default=None,
         ge=1,
         le=_FILTER_STEEPEST,
-        description="of the filter; falls by 6 dB an octave for each",
+        description="order of the filter: 6 dB per octave each",
     )
 
     @model_validator(mode="after")
@@ -91,7 +94,7 @@ class Accelerometer(Part):
             faults.append(f"axes = {list(self.axes)} must be different; remove one")
         if self.axes and self.direction:
             faults.append(
-                f"direction = {self.direction!r} must be empty beside axes, which have their own; "
+                f"direction = {self.direction!r} must be empty with axes, which have their own; "
                 "remove it"
             )
         if self.axes and len(self.name) > NAME_LONGEST - 2:
@@ -108,7 +111,7 @@ class Accelerometer(Part):
         lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
         value = getattr(self, f"mounting_{lone}")
         return [
-            f"mounting_{lone} = {value:g} needs mounting_{other} beside it; add it or remove both"
+            f"mounting_{lone} = {value:g} needs mounting_{other} as well; add it or remove both"
         ]
 
     def _filter_faults(self) -> list[str]:
@@ -121,7 +124,7 @@ class Accelerometer(Part):
                 if getattr(self, name) is not None
             ]
         return [
-            f"anti_alias = {self.anti_alias!r} needs {name} beside it; add it"
+            f"anti_alias = {self.anti_alias!r} needs {name} as well; add it"
             for name in fields
             if getattr(self, name) is None
         ]
@@ -148,10 +151,10 @@ def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
 
 
 class Tacho(Part):
-    """A rectangular pulse per revolution, rising at shaft angle zero or `late` after it."""
+    """A rectangular pulse per revolution, rising at shaft angle `late`, by default zero."""
 
     name: str = Field(
-        default="tacho", min_length=1, max_length=NAME_LONGEST, description="of its channel"
+        default="tacho", min_length=1, max_length=NAME_LONGEST, description="channel name"
     )
     pulse_width: Angle = Field(
         default=math.radians(10.0),
@@ -160,7 +163,7 @@ class Tacho(Part):
         description="shaft angle for which the pulse is high",
     )
     level: Voltage = Field(
-        default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST, description="of the pulse, above 0 V"
+        default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST, description="height of the pulse above 0 V"
     )
     late: Angle = Field(
         default=0.0, ge=-math.pi, le=math.pi, description="shaft angle at which the pulse rises"
@@ -176,12 +179,12 @@ class Tacho(Part):
 
 
 def acceleration_channel(name: str, place: str, direction: str) -> Channel:
-    """Channel of an accelerometer: where it sits, and which way it measures."""
+    """Channel of an accelerometer with its place and direction."""
     return Channel(
         name=name, unit="m/s^2", quantity="acceleration", place=place, direction=direction
     )
 
 
 def displacement_channel(name: str, place: str, direction: str) -> Channel:
-    """Channel of a proximity probe: where it sits, and which way it measures."""
+    """Channel of a proximity probe with its place and direction."""
     return Channel(name=name, unit="m", quantity="displacement", place=place, direction=direction)

@@ -1,4 +1,4 @@
-"""Units and their symbols: texts with a unit to SI, and back to words."""
+"""Units and their symbols: conversion of texts to SI, and SI symbols."""
 
 import math
 import re
@@ -95,14 +95,14 @@ def to_si(value: Any, dimension: str) -> float:
     if not isinstance(value, str):
         try:
             return float(value)
-        except OverflowError:  # a whole number of hundreds of digits
+        except OverflowError:  # an integer of hundreds of digits
             return math.inf if value > 0 else -math.inf
     return _text_to_si(value, dimension)
 
 
 @lru_cache(maxsize=4096)
 def _text_to_si(value: str, dimension: str) -> float:
-    """Kept, as a recipe validates its scene a hundred times, each draw at its extremes."""
+    """Convert a text; cached, as a recipe validates its scene a hundred times."""
     units = UNITS[dimension]
     match = _QUANTITY.fullmatch(value)
     if match is None:
@@ -113,14 +113,14 @@ def _text_to_si(value: str, dimension: str) -> float:
         unit = match["unit"]
         missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
         raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
-    try:  # a product of decimals keeps 0.13 mm at exactly 0.00013, that of two floats would not
+    try:  # a decimal product makes 0.13 mm exactly 0.00013, a product of two floats would not
         return float(Decimal(number) * Decimal(repr(units[unit])))
-    except ArithmeticError:  # an exponent beyond decimals; the caller refuses what is not finite
+    except ArithmeticError:  # an exponent beyond decimals; the caller checks for finite values
         return float(number) * units[unit]
 
 
 def listed_unit(text: str, dimension: str) -> str | None:
-    """Unit of :data:`UNITS` that a text spells; None where it is none of the dimension.
+    """Unit of :data:`UNITS` that a text spells; None if it is none of the dimension.
 
     A product may be written with a blank, ``*``, ``·``, ``.``, ``-`` or nothing, a power as ``^2``,
     ``**2``, ``²`` or ``2``, and micro as ``u``, ``µ`` or ``μ``.

@@ -1,4 +1,4 @@
-"""What is wrong with a table of fields, in words: place, value, bound, cure."""
+"""Faults of a table of fields in words: place, value, bound, cure."""
 
 import difflib
 import reprlib
@@ -11,9 +11,9 @@ from .units import to_si, unit_symbol
 
 
 def nearest(word: str, choices: Any) -> str:
-    """End of an error message: the choice that was probably meant, or all of them."""
+    """End of an error message: the most similar choice, or all of them."""
     whole = [choice for choice in choices if word in choice.split("_")]
-    if len(whole) > 1:  # "clearance" is both of the two clearances
+    if len(whole) > 1:  # "clearance" matches both of the two clearances
         return f"; did you mean {' or '.join(map(repr, sorted(whole)))}?"
     matches = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)
     if matches:
@@ -22,9 +22,9 @@ def nearest(word: str, choices: Any) -> str:
 
 
 def fault_lines(model: type[BaseModel], entry: Any) -> list[str]:
-    """Turn one pydantic error into lines with path, value, bound and cure."""
+    """Convert a pydantic error into lines with path, value, bound and cure."""
     location = entry["loc"]
-    if location[-1:] == ("float",):  # the number of a union, not a part of the path
+    if location[-1:] == ("float",):  # the member of a union, not a part of the path
         location = location[:-1]
     path = ".".join(str(part) for part in location)
     kind, context = entry["type"], entry.get("ctx", {})
@@ -37,14 +37,14 @@ def fault_lines(model: type[BaseModel], entry: Any) -> list[str]:
         return [f"{path} is missing{about}; add it"]
     if kind == "value_error":
         text = str(context["error"])
-        if text.startswith(("has ", "is not ")):  # from to_si, about this one value
+        if text.startswith(("has ", "is not ")):  # from to_si, about this value
             return [f"{path} = {_short(entry['input'])} {text}"]
         return [f"{path}: {line}" if path else line for line in text.splitlines()]
     return [f"{path} = {_shown(entry['input'], field)} {_bound(entry)}{about}{_cure(entry, field)}"]
 
 
 def _cure(entry: Any, field: Any) -> str:
-    """A number out of bounds has a slipped exponent or a wrong unit."""
+    """Cure for a number out of bounds, which has a wrong exponent or unit."""
     out = entry["type"].startswith(("greater_", "less_"))
     return "; check value and unit" if out and _dimension_of(field) not in (None, "ratio") else ""
 
@@ -65,7 +65,7 @@ _KINDS = {
     "dict_": "must be a table",
     "mapping_": "must be a table",
 }
-"""What a value must be, by the beginning of pydantic's name of the fault."""
+"""Requirement on a value, by the beginning of pydantic's error type."""
 
 
 def _bound(entry: Any) -> str:
@@ -78,7 +78,7 @@ def _bound(entry: Any) -> str:
     for beginning, text in _KINDS.items():
         if entry["type"].startswith(beginning):
             return text.format_map(context)
-    return "must be of another kind; see a built-in one"  # no kind that a scene has today
+    return "must be of another kind; see a built-in one"  # no kind that any scene has at present
 
 
 def _shown(value: Any, field: Any) -> str:
@@ -101,7 +101,7 @@ def _dimension_of(field: Any) -> str | None:
 
 
 def _short(value: Any) -> str:
-    """A value for a message, cut where it would bury the rest."""
+    """A value for a message, shortened if it is long."""
     text = reprlib.repr(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
@@ -119,7 +119,7 @@ def metadata_of(field: Any) -> list[Any]:
 
 
 def _find_field(model: type[BaseModel], location: tuple[Any, ...]) -> tuple[Any, Any]:
-    """Model class that owns the last name of a location, and the field where there is one."""
+    """Model class that owns the last name of a location, and the field if there is one."""
     owner: Any = model
     field = None
     for part in location:
@@ -132,7 +132,7 @@ def _find_field(model: type[BaseModel], location: tuple[Any, ...]) -> tuple[Any,
 
 
 def si_unit(model: type[BaseModel], path: str) -> str:
-    """SI unit of a number of a scene at a dotted path; empty where it has none.
+    """SI unit of a number of a scene at a dotted path; empty if it has none.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def si_unit(model: type[BaseModel], path: str) -> str:
 
 
 def model_inside(annotation: Any) -> type[BaseModel] | None:
-    """Model in an annotation, also in a list or beside None; None where there is none."""
+    """Model in an annotation, also in a list or union with None; None if there is none."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     found = (model_inside(inner) for inner in getattr(annotation, "__args__", ()))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..output.recording import missing_file
-from ..parts.casing import beside
+from ..parts.casing import with_folder
 from ..parts.part import without_twin
 from ..parts.wording import nearest
 from .journal import JournalScene
@@ -312,7 +312,9 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
     4.0
     """
     table = scene_table(scene_text(name_or_path), str(name_or_path))
-    return scene_from_table(beside(override(table, overrides or {}), scene_folder(name_or_path)))
+    return scene_from_table(
+        with_folder(override(table, overrides or {}), scene_folder(name_or_path))
+    )
 
 
 def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
