@@ -383,7 +383,7 @@ class Search:
         return self.kept if self.best is None or self.fault else self.best
 
     def _convergences(self, comparison: Comparison) -> Iterator[Convergence]:
-        """Convergence of each numerical effect with three levels or more, omitting those between."""
+        """Convergence of each numerical effect that has enough regular levels."""
         levels = {level_name(factor) for factor in STEP_LEVELS}
         for name in comparison.rungs:
             rungs = [r for r in comparison.rungs[name] if r.name in levels][-_LEVELS_SHOWN:]
