@@ -78,7 +78,7 @@ def test_a_bowl_is_informative_and_has_no_trend(ranked):
     assert found["bowl"].information == pytest.approx(found["exact"].information - 1, abs=0.5)
     assert abs(found["bowl"].spearman) < 0.2
     assert found["bowl"].trendability < 0.2
-    assert found["bowl"] in ranked.telling
+    assert found["bowl"] in ranked.informative
 
 
 def test_machines_that_contradict_each_other_have_a_trend_and_no_common_one(ranked, known):
@@ -96,7 +96,7 @@ def test_a_start_of_its_own_hides_the_trend_over_all_machines_alone(ranked):
 
 def test_noise_and_constants_tell_no_more_than_chance(ranked):
     found = by_name(ranked)
-    telling = {each.name for each in ranked.telling}
+    telling = {each.name for each in ranked.informative}
     assert telling >= {"exact", "falling", "bowl"}
     assert "constant" not in telling
     assert found["constant"].information == 0.0

@@ -1,8 +1,8 @@
-"""Blows in a recording: a class whose every recording has some is not that of one without.
+"""Impacts in a recording: one without impacts does not belong to a class that always has some.
 
-A damaged bearing strikes; a sound one hisses. What noise does is known without any training, so
-that a handful of recordings is enough to tell that a recording lacks what a class always has, where
-a distance in the space of features would ask for many.
+A damaged bearing causes impacts, a sound one noise. The score of noise is known without training,
+so that a few recordings suffice to detect missing impacts, whereas a distance in feature space
+would need many.
 """
 
 from pathlib import Path
@@ -24,18 +24,18 @@ from .feature_table import (
 Float = NDArray[np.float64]
 
 NOISE_SCORE: Final = 7.0
-"""Score of a kurtogram that noise reaches in one record of a hundred [-]."""
+"""Kurtogram score that noise reaches in one of a hundred records [-]."""
 
 FEWEST_SHOWING: Final = 3
-"""Recordings of a class by which it can be said always to have blows."""
+"""Fewest recordings of a class from which to conclude that it always has impacts."""
 
 _FEATURE = "kurtogram"
 _ROW = FeatureSelection(only=(_FEATURE,))
-_WEAK_SHARE = 0.05  # windows of a recording that may be weaker: a window can fall between blows
+_WEAK_SHARE = 0.05  # of the windows may be weaker: a window can fall between impacts
 
 
 def blow_scores(recording: Recording) -> Float:
-    """Score of the blows in every channel of a recording.
+    """Impact score of every channel of a recording.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def blow_scores(recording: Recording) -> Float:
     Returns
     -------
     numpy.ndarray [shape=(n_channels,)]
-        :attr:`wearstate.features.signal.kurtogram.Kurtogram.score` [-]; empty where the
+        :attr:`wearstate.features.signal.kurtogram.Kurtogram.score` [-]; empty if the
         recording is too short for it.
 
     Raises
@@ -65,19 +65,19 @@ def blow_table(path: str | Path, n_records: int, *, jobs: int = 1) -> Float:
     path : str or Path
         Data set file.
     n_records : int
-        Usable ones in it.
+        Number of usable records.
     jobs : int
         Worker processes; the result does not depend on it.
 
     Returns
     -------
     numpy.ndarray [shape=(n_records, n_channels)]
-        Without columns where the records are too short.
+        Without columns if the records are too short.
 
     Raises
     ------
     DataError
-        As :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
+        As in :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
     """
     if _FEATURE in absent_in(path, FeatureSelection(feature_set="complete")):
         return np.empty((n_records, 0))
@@ -90,20 +90,20 @@ def _scores_in(names: tuple[str, ...], values: Float) -> Float:
 
 
 def blow_floors(scores: Float, groups: NDArray[np.intp]) -> Float:
-    """Least score that the recordings of one class have.
+    """Smallest score of the recordings of one class.
 
     Parameters
     ----------
     scores : numpy.ndarray [shape=(n_records, n_channels)]
-        Of the records of the class.
+        Scores of the records of the class.
     groups : numpy.ndarray [shape=(n_records,)]
         Recording of each.
 
     Returns
     -------
     numpy.ndarray [shape=(n_channels,)]
-        Of the weakest recording, one in twenty of its records left out; 0 of fewer than three
-        recordings, of which nothing can be said to be always so.
+        Score of the weakest recording, without a twentieth of its records; 0 for fewer than three
+        recordings, which allow no conclusion.
 
     Examples
     --------
@@ -122,19 +122,19 @@ def blow_floors(scores: Float, groups: NDArray[np.intp]) -> Float:
 
 
 def lacks_blows(scores: Float, floors: Float) -> bool:
-    """Whether a recording has no blow where every recording of a class has some.
+    """Whether a recording lacks the impacts that every recording of a class has.
 
     Parameters
     ----------
     scores : numpy.ndarray [shape=(n_channels,)]
-        Of the recording; empty where they are not known.
+        Scores of the recording; empty if unknown.
     floors : numpy.ndarray [shape=(n_channels,)]
-        Of the class, of :func:`blow_floors`.
+        Scores of the class, from :func:`blow_floors`.
 
     Returns
     -------
     bool
-        The class has blows above those of noise in some channels, and the recording none in any of
+        True if the class exceeds the score of noise in some channels, and the recording in none of
         these.
 
     Examples

@@ -1,4 +1,4 @@
-"""Which features a model is trained on: told in words, chosen by folds, kept in its card."""
+"""Features for training a model: given in words, selected in folds, kept in its card."""
 
 import re
 from collections.abc import Sequence
@@ -30,27 +30,27 @@ Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 SELECT = "select"
-"""Word for a choice among all sets."""
+"""Word for a selection among all sets."""
 
 _SETS: tuple[SetName, ...] = get_args(SetName)
 _LINES = tuple(each for each in CANDIDATES if each.cost_ms < 0.1)
-_TIE = 0.01  # of the error: a later set that is no better than this is not worth its time
+_TIE = 0.01  # of the error: a later set must be better by more to be worth its time
 _TIMED = 3  # records whose features are timed
 
 
 def choices_of(words: Sequence[str]) -> tuple[FeatureSelection, ...]:
-    """Candidates for the features of a model, from what a command line says.
+    """Candidates for the features of a model, from words of a command line.
 
     Parameters
     ----------
     words : sequence of str
-        Each a set, several sets parted by commas, ``select`` for all sets, names of features or
-        values parted by commas, or a text file of such names; `#` begins a comment in it.
+        Each a set, several sets separated by commas, ``select`` for all sets, names of features or
+        values separated by commas, or a text file with such names and `#` comments.
 
     Returns
     -------
     tuple of FeatureSelection
-        In the order told; the set that models are usually trained on where nothing is.
+        In the order given; without words the usual set.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _choices(word: str) -> list[FeatureSelection]:
 
 
 def _names_in(word: str) -> list[str]:
-    """Names parted by commas, or those in the lines of a file."""
+    """Names separated by commas, or on the lines of a file."""
     file = Path(word)
     text = word
     if file.suffix and file.is_file():
@@ -95,7 +95,7 @@ def _names_in(word: str) -> list[str]:
 
 
 def words_of(choice: FeatureSelection) -> str:
-    """A choice as a person tells it.
+    """A choice in words.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def choice_in(kept: FeatureChoice) -> FeatureSelection:
     Parameters
     ----------
     kept : FeatureChoice
-        Of the model's card.
+        Entry of the model's card.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def choice_in(kept: FeatureChoice) -> FeatureSelection:
 
 
 def choice_card(choice: FeatureSelection) -> FeatureChoice:
-    """What a card keeps of a choice."""
+    """Entry of a card for a choice."""
     return FeatureChoice(set=choice.feature_set, only=list(choice.only or ()))
 
 
@@ -137,9 +137,9 @@ class Candidates:
     ----------
     choices : tuple of FeatureSelection
     columns : tuple of numpy.ndarray
-        Of each, in the table of all.
+        Columns of each, in the table of all.
     whole : FeatureSelection
-        What the table of all is made of.
+        Features of the table of all.
     """
 
     choices: tuple[FeatureSelection, ...]
@@ -154,16 +154,16 @@ class Candidates:
 def candidates_of(
     path: str | Path, choices: Sequence[FeatureSelection], healthy: Healthy | None = None
 ) -> Candidates:
-    """Columns of each candidate, told by the first usable record of a data set.
+    """Columns of each candidate, from the first usable record of a data set.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
     choices : sequence of FeatureSelection
-        One or more, all of the same views.
+        At least one, all with the same views.
     healthy : Healthy, optional
-        As of :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
+        As in :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
 
     Returns
     -------
@@ -172,8 +172,8 @@ def candidates_of(
     Raises
     ------
     DataError
-        The data set has no usable record, a feature that is named does not exist or is not to be
-        had, or two candidates are the same features here.
+        The data set has no usable record, a named feature does not exist or cannot be computed, or
+        two candidates have the same features here.
     """
     each = [feature_table_names(path, choice, healthy) for choice in choices]
     if len(set(each)) < len(each):
@@ -198,15 +198,15 @@ def candidates_of(
 def costs_ms(
     path: str | Path, choices: Sequence[FeatureSelection], healthy: Healthy | None = None
 ) -> list[float]:
-    """Time that the features of one recording take, of each choice [ms].
+    """Computing time of the features of one recording, for each choice [ms].
 
     Parameters
     ----------
     path : str or Path
-        Data set; the least time of its first few usable records is taken, after a first call.
+        Data set; the shortest time of its first few usable records counts, after a first call.
     choices : sequence of FeatureSelection
     healthy : Healthy, optional
-        As of :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`; its own time is
+        As in :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`; its own time is
         not counted.
     """
     with JoinedSet(Path(path), choices[0].views) as data:
@@ -228,16 +228,16 @@ def costs_ms(
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """Which set the records ask for, by folds of whole machines.
+    """Selected set, by folds of whole machines.
 
     Attributes
     ----------
     chosen : int
-        Place of the set, by all records.
+        Index of the set selected from all records.
     errors : tuple of float
-        Mean absolute error of straight lines on each set, out of fold [unit of the target].
+        Out-of-fold mean absolute error of linear models on each set [unit of the target].
     by_fold : tuple of int
-        Place of the set that the training records of each outer fold ask for.
+        Index of the set selected from the training records of each outer fold.
     """
 
     chosen: int
@@ -253,7 +253,7 @@ def select_set(
     *,
     seed: int = 0,
 ) -> Selection:
-    """Choose one of several sets of features, and what each outer fold would have chosen.
+    """Select one of several feature sets, from all records and within each outer fold.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def select_set(
     folds : sequence of (numpy.ndarray, numpy.ndarray)
         Outer folds.
     seed : int
-        Of the inner folds.
+        Seed of the inner folds.
 
     Returns
     -------
@@ -274,10 +274,10 @@ def select_set(
 
     Notes
     -----
-    For an outer fold the choice is made by inner folds of its training records alone, so that the
-    error of the chosen set on what the fold leaves out is that of unseen machines, choice included.
-    Lines alone are tried: they take a hundredth of the time of the trees. The choice is the first
-    set within one per cent of the least error.
+    In an outer fold the selection uses inner folds of its training records alone, so that the error
+    of the selected set on the left-out records is that of unseen machines, selection included. Only
+    linear models are used: they take a hundredth of the time of the trees. The first set within one
+    per cent of the smallest error is selected.
 
     Examples
     --------
@@ -297,7 +297,7 @@ def select_set(
 
 
 def _line_error(rows: Float, target: Float, folds: Folds) -> float:
-    """Least mean absolute error of a straight line, out of fold."""
+    """Smallest out-of-fold mean absolute error of a linear model."""
     errors = np.zeros(len(_LINES))
     for train, test in folds:
         for i, line in enumerate(_LINES):
@@ -312,7 +312,7 @@ def _first(errors: Sequence[float]) -> int:
 
 
 def feature_words(name: str) -> str:
-    """Feature name for people.
+    """Feature name in words.
 
     Examples
     --------
@@ -339,7 +339,7 @@ def feature_words(name: str) -> str:
 
 
 def value_words(name: str, value: float) -> str:
-    """Value of a feature for people.
+    """Value of a feature with its unit.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Which features tell the wear: information, trend within machines, and agreement between them."""
+"""Ranking of features by information on the wear, and by trend within and across machines."""
 
 import math
 from collections.abc import Sequence
@@ -14,17 +14,17 @@ from ..learning.information import mutual_information
 Float = NDArray[np.float64]
 
 LEAST_OF_MACHINE = 4
-"""Records of one machine below which a rank correlation within it is 1 too easily."""
+"""Fewest records of one machine: with fewer, a rank correlation is 1 too easily."""
 
-_LEAST = 10  # records with a value, to estimate information from
-_CHANCE = 95  # per cent of the features without any information stay below the chance level
-_SHUFFLED = 40  # values at least that the chance level is taken from
+_LEAST = 10  # fewest records with a value for an estimate of information
+_CHANCE = 95  # percentile of features without information that defines the chance level
+_SHUFFLED = 40  # fewest values for the chance level
 _PER_BIT = math.log(2)  # nats
 
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureRank:
-    """What one feature tells of the target; NaN where that cannot be told.
+    """Information of one feature on the target; NaN if it cannot be estimated.
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class FeatureRank:
     monotonicity : float
         Mean over machines of the magnitude of the rank correlation within a machine, 0 to 1.
     trendability : float
-        Magnitude of the mean over machines of that correlation, 0 to 1: as large as the
-        monotonicity where all machines agree on the direction, 0 where they contradict each other.
+        Magnitude of the mean over machines of that correlation, 0 to 1: equal to the monotonicity
+        if all machines agree on the direction, 0 if they contradict each other.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Ranking:
     ----------
     features : tuple of FeatureRank
     chance : float
-        Information [bits] that 95 % of the features stay below where the target is shuffled.
+        95th percentile of the information [bits] with a shuffled target.
     n_records, n_machines : int
     n_followed : int
         Machines with enough records for a correlation within them.
@@ -71,7 +71,7 @@ class Ranking:
     n_followed: int
 
     @property
-    def telling(self) -> tuple[FeatureRank, ...]:
+    def informative(self) -> tuple[FeatureRank, ...]:
         """Features with more information than chance."""
         return tuple(each for each in self.features if each.information > self.chance)
 
@@ -86,24 +86,24 @@ def rank_features(
     classes: bool = False,
     seed: int = 0,
 ) -> Ranking:
-    """Rank features by what they tell of a severity or of named conditions.
+    """Rank features by their information on a severity or on named conditions.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     values : array_like [shape=(n_records, n_features)]
-        NaN where a record has none.
+        NaN for missing values.
     target : array_like [shape=(n_records,)]
         Severity, or label of the condition.
     machines : array_like [shape=(n_records,)]
         Machine of each record.
     grades : array_like, optional [shape=(n_records,)]
-        Grade of each record; negative where it is unknown.
+        Grade of each record; negative if unknown.
     classes : bool
-        The target names conditions, which have no order: no correlations are told.
+        The target names conditions, which have no order: no correlations are computed.
     seed : int
-        Of the shuffled target, and of the estimate's tie breaking.
+        Seed of the shuffled target and of the tie breaking.
 
     Returns
     -------
@@ -112,10 +112,10 @@ def rank_features(
     Notes
     -----
     Information is estimated from nearest neighbours of the ranks (Kraskov, Stoegbauer, Grassberger
-    2004, doi:10.1103/PhysRevE.69.066138; Ross 2014, doi:10.1371/journal.pone.0087357), so that no
-    monotonic scale of a feature changes it. It knows one feature at a time: two that repeat each
-    other are both high, two that tell only together are both low. Trendability is after Coble and
-    Hines 2009, with rank correlations.
+    2004, doi:10.1103/PhysRevE.69.066138; Ross 2014, doi:10.1371/journal.pone.0087357), so that a
+    monotonic scaling of a feature does not change it. Features are considered one at a time: two
+    redundant ones are both high, two that are informative only together are both low. Trendability
+    follows Coble and Hines 2009, with rank correlations.
 
     Examples
     --------
@@ -141,17 +141,17 @@ def rank_features(
             FeatureRank(
                 name=name,
                 information=_information(column, aim, classes=classes, seed=seed),
-                grades=math.nan if known is None else _of_grades(column, known, seed),
+                grades=math.nan if known is None else _grade_information(column, known, seed),
                 spearman=math.nan if classes else _spearman(column, aim),
                 monotonicity=float(monotonicity[place]),
                 trendability=float(trendability[place]),
             )
         )
     order = sorted(found, key=lambda each: (-np.nan_to_num(each.information, nan=-1), each.name))
-    told = [value for value in chance if not math.isnan(value)]
+    finite = [value for value in chance if not math.isnan(value)]
     return Ranking(
         features=tuple(order),
-        chance=float(np.percentile(told, _CHANCE)) if told else math.nan,
+        chance=float(np.percentile(finite, _CHANCE)) if finite else math.nan,
         n_records=len(rows),
         n_machines=len(np.unique(group)),
         n_followed=n_followed,
@@ -167,36 +167,36 @@ def _numbered(labels: ArrayLike) -> Float:
 
 
 def _information(column: Float, aim: NDArray[Any], *, classes: bool, seed: int) -> float:
-    """Mutual information of one feature with the target [bits]; of a constant one 0."""
-    there = np.isfinite(column)
-    if there.sum() < _LEAST:
+    """Mutual information of one feature with the target [bits]; 0 for a constant feature."""
+    valid = np.isfinite(column)
+    if valid.sum() < _LEAST:
         return math.nan
-    own = _ranks(column[there])
+    own = _ranks(column[valid])
     if np.ptp(own) == 0:
         return 0.0
-    return mutual_information(own, aim[there], classes=classes, seed=seed) / _PER_BIT
+    return mutual_information(own, aim[valid], classes=classes, seed=seed) / _PER_BIT
 
 
-def _of_grades(column: Float, grades: NDArray[np.int64], seed: int) -> float:
-    """Share of the grades' entropy that a feature tells."""
-    there = np.isfinite(column) & (grades >= 0)
-    share = np.bincount(grades[there]) / max(there.sum(), 1)
+def _grade_information(column: Float, grades: NDArray[np.int64], seed: int) -> float:
+    """Mutual information of a feature with the grades, over their entropy."""
+    valid = np.isfinite(column) & (grades >= 0)
+    share = np.bincount(grades[valid]) / max(valid.sum(), 1)
     entropy = -float(np.sum(share[share > 0] * np.log2(share[share > 0])))
     if entropy == 0:
         return math.nan
-    known = _information(column[there], grades[there], classes=True, seed=seed)
+    known = _information(column[valid], grades[valid], classes=True, seed=seed)
     return min(known / entropy, 1.0)
 
 
 def _spearman(column: Float, aim: Float) -> float:
-    there = np.isfinite(column)
-    return float(_correlation(column[there, None], aim[there])[0]) if there.sum() > 1 else math.nan
+    valid = np.isfinite(column)
+    return float(_correlation(column[valid, None], aim[valid])[0]) if valid.sum() > 1 else math.nan
 
 
 def _within(
     rows: Float, aim: Float, group: NDArray[Any], *, classes: bool
 ) -> tuple[Float, Float, int]:
-    """Mean magnitude and magnitude of the mean of the correlations within machines."""
+    """Mean magnitude, and magnitude of the mean, of the correlations within machines."""
     found = [
         _correlation(rows[own], aim[own])
         for machine in np.unique(group)
@@ -214,7 +214,7 @@ def _within(
 
 
 def _correlation(rows: Float, aim: Float) -> Float:
-    """Rank correlation of every column with the target; 0 of a constant, NaN of a broken one."""
+    """Rank correlation of every column with the target; 0 if constant, NaN if not finite."""
     whole = np.isfinite(rows).all(axis=0)
     ranks = rankdata(np.where(whole, rows, 0.0), axis=0)
     ranks -= ranks.mean(axis=0)

@@ -1,4 +1,4 @@
-"""A data set's signals turned into its feature table."""
+"""Feature table of a data set, from its signals."""
 
 import math
 from collections import Counter
@@ -25,7 +25,7 @@ from ...features.signal.envelope import BearingFrequencies, bearing_frequencies
 from ...sim.atomic import replacing
 from ...sim.output.recording import DataError, Recording
 
-_BATCH = 16  # records a worker reads at a time: 20 MB, and few enough to keep both cores busy
+_BATCH = 16  # records per task of a worker: 20 MB, few enough to balance the load
 
 Progress = Callable[[int, int], None]
 
@@ -43,8 +43,8 @@ class FeatureTable:
     manifest : pandas.DataFrame
         The same records' labels, conditions and numerics.
     lacking : dict
-        Name of a view -> records that lack it [shape=(n_records,)]: its values are NaN there.
-        Views that no record lacks are left out.
+        Name of a view -> whether each record lacks it [shape=(n_records,)]; its values are NaN
+        then. Only views that some record lacks.
     """
 
     names: tuple[str, ...]
@@ -60,14 +60,14 @@ class FeatureTable:
 
     @property
     def lacking_words(self) -> list[str]:
-        """Views that records lack, as sentences."""
+        """Sentences on views that records lack."""
         return [
             f"{int(flags.sum())} of {len(flags)} records have no view {name}"
             for name, flags in self.lacking.items()
         ]
 
     def named(self, names: Sequence[str]) -> "FeatureTable":
-        """The table with some of its features."""
+        """The table with a subset of its features."""
         place = {name: i for i, name in enumerate(self.names)}
         columns = [place[name] for name in names]
         return replace(self, names=tuple(names), values=self.values[:, columns])
@@ -79,17 +79,17 @@ class FeatureTable:
 
 
 def confounders_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
-    """Faults beside the wear that a manifest labels.
+    """Faults other than the wear that a manifest labels.
 
     Parameters
     ----------
     manifest : pandas.DataFrame
-        Of a data set; its columns ``confounder_<name>`` are read.
+        Manifest of a data set; its columns ``confounder_<name>`` are read.
 
     Returns
     -------
     dict
-        Name -> whether it is present [shape=(n_records,)]; empty where nothing is labelled.
+        Name -> whether it is present [shape=(n_records,)]; empty without labels.
 
     Examples
     --------
@@ -106,8 +106,8 @@ def confounders_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
 _CONFOUNDER = "confounder_"
 
 REGIMES = {"lubrication": "pin"}
-"""Choices of a recipe that change what wear sounds like, and what they are of: a model tells which
-one it hears."""
+"""Choices of a recipe that change the vibration caused by wear, and the part they refer to: a model
+recognises them."""
 
 
 def regimes_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
@@ -116,12 +116,12 @@ def regimes_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
     Parameters
     ----------
     manifest : pandas.DataFrame
-        Of a data set; its columns ``choice_<regime>`` are read.
+        Manifest of a data set; its columns ``choice_<regime>`` are read.
 
     Returns
     -------
     dict
-        ``<regime>_<option>`` -> whether a record has it [shape=(n_records,)].
+        ``<regime>_<option>`` -> whether each record has it [shape=(n_records,)].
 
     Examples
     --------
@@ -137,7 +137,7 @@ def regimes_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
 
 
 def is_regime(name: str) -> bool:
-    """Whether a finding is of a regime, and not of a fault.
+    """Whether a finding names a regime, not a fault.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def is_regime(name: str) -> bool:
 
 
 def regime_words(name: str) -> str:
-    """A regime with what it is of.
+    """A regime with the part it refers to.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def regime_words(name: str) -> str:
 
 
 def kind_words(name: str) -> str:
-    """A kind of recordings that a model refuses.
+    """A kind of recording that a model refuses, in words.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def kind_words(name: str) -> str:
 
 
 def knows_no_oil(severity: str, findings: Sequence[str]) -> bool:
-    """Whether a model of the clearance of a pin was trained without regimes of lubrication.
+    """Whether a model of a pin's clearance was trained without lubrication regimes.
 
     Examples
     --------
@@ -185,13 +185,13 @@ def knows_no_oil(severity: str, findings: Sequence[str]) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureSelection:
-    """Which features of a recording are wanted; by default those that models are trained on.
+    """Selected features of a recording; by default those that models are trained on.
 
     Attributes
     ----------
     feature_set, only, settings
-        As of :func:`wearstate.features.catalogue.row.feature_row`; a name in `only` with a view
-        before it, as ``running:rms``, is of that view alone.
+        As in :func:`wearstate.features.catalogue.row.feature_row`; a name in `only` with a view
+        prefix, such as ``running:rms``, selects from that view alone.
     views : tuple of CompletingView
         Data sets whose records complete each row.
     """
@@ -202,7 +202,7 @@ class FeatureSelection:
     views: tuple[CompletingView, ...] = ()
 
     def part(self, view: str = "") -> "FeatureSelection | None":
-        """The choice among the features of one view, or of the record itself; None: none.
+        """Selection for one view, or for the record itself; None if it is empty.
 
         Examples
         --------
@@ -217,7 +217,7 @@ class FeatureSelection:
 
 
 def held_against(choice: FeatureSelection, reference: FrfReference | None) -> FeatureSelection:
-    """The same features, told against a healthy reference."""
+    """The same features, relative to a healthy reference."""
     if reference is None:
         return choice
     return replace(choice, settings=replace(choice.settings, reference=reference))
@@ -227,11 +227,11 @@ class Healthy(Protocol):
     """Transfer functions of machines when they were healthy."""
 
     def of(self, machine: str) -> FrfReference | None:
-        """Those of a machine; None where there are none."""
+        """Reference of a machine; None if there is none."""
 
 
 USUAL = FeatureSelection()
-"""What models are trained on."""
+"""Usual features for training."""
 
 
 def choice_of(
@@ -246,29 +246,29 @@ def choice_of(
     envelope_band: Sequence[float] | None = None,
     exponential: float = 1.0,
 ) -> FeatureSelection:
-    """FeatureSelection of features from plain numbers and words, as a command line has them.
+    """Make a feature selection from plain numbers and words, as given on a command line.
 
     Parameters
     ----------
     feature_set : {"standard", "core", "complete"}
-        Which rows.
+        Set of features.
     only : sequence of str
-        Names of features or values; all of the set if empty.
+        Names of features or values; if empty, all of the set.
     machine : str, optional
         Kind of machine, a key of :data:`wearstate.features.signal.iso.KINDS`.
     speed_hz : float, optional
-        Nominal shaft speed [Hz]; the one stored with each record by default.
+        Nominal shaft speed [Hz]; by default the one stored with each record.
     speed_band_hz : sequence of float, optional
-        Where the speed is looked for without a tacho, low and high [Hz].
+        Search range of the speed without a tacho, low and high [Hz].
     bearing : sequence of float, optional
-        Rollers, their diameter, pitch diameter (one unit for both) and, if it is not 0, contact
+        Number of rollers, their diameter, pitch diameter (in the same unit) and optionally contact
         angle [deg].
     bands : sequence of sequence of float
-        Bands of your own, low and high [Hz].
+        Additional bands, low and high [Hz].
     envelope_band : sequence of float, optional
         Low and high [Hz].
     exponential : float
-        What the exponential window of an impact test has sunk to at the end of a block, 0 to 1 [-].
+        Value of an impact test's exponential window at the end of a block, 0 to 1 [-].
 
     Returns
     -------
@@ -278,7 +278,7 @@ def choice_of(
     Raises
     ------
     DataError
-        A number of values is wrong, or the geometry is none; all faults at once.
+        A number of values is wrong, or the geometry is invalid; all faults at once.
 
     Examples
     --------
@@ -342,25 +342,24 @@ def _geometry(values: Sequence[float] | None, faults: list[str]) -> BearingFrequ
 
 
 def absent_in(path: str | Path, choice: FeatureSelection) -> dict[str, str]:
-    """Features of a choice that a data set cannot have, told by its first record.
+    """Features of a choice that a data set cannot have, judged by its first record.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
     choice : FeatureSelection
-        Which features.
+        Selected features.
 
     Returns
     -------
     dict
-        Name -> why, with what helps; empty where single features were asked for.
+        Name -> reason, with the cure; empty if single features were selected.
 
     Raises
     ------
     DataError
-        The file cannot be read; or a feature that was asked for by name does not exist, or is not
-        to be had of it.
+        The file cannot be read; or a feature selected by name does not exist or cannot be computed.
     """
     with DataSet(path) as data:
         if len(data) == 0:
@@ -385,20 +384,20 @@ def recording_features(
     recording : Recording
         With or without tacho.
     choice : FeatureSelection
-        Which features.
+        Selected features.
 
     Returns
     -------
     names : tuple of str
-        As :func:`wearstate.features.catalogue.row.feature_names`; those of a view have its name in
-        front: ``running:acc_aft.rms``.
+        As in :func:`wearstate.features.catalogue.row.feature_names`; those of a view are prefixed
+        with its name: ``running:acc_aft.rms``.
     values : numpy.ndarray [shape=(n_features,)]
         Finite.
 
     Raises
     ------
     DataError
-        The signal cannot be turned into features; the text says why and what helps.
+        The features cannot be computed; the text names reason and cure.
     """
     if not recording.joined and choice.part() is choice:
         return _own_features(recording, choice)
@@ -433,22 +432,22 @@ def _own_features(
 
 
 def _about(recording: Recording, settings: Settings) -> Settings:
-    """Settings with the speed that is stored with a record, where none is given and one is used."""
+    """Settings completed by the speed stored with a record, if one is needed and none given."""
     used = settings.machine is not None or (settings.bearing and recording.tacho is None)
     if settings.speed_hz is not None or not used:
-        return settings  # one and the same for all records: their plan of names is made once
+        return settings  # identical for all records, whose names are then planned only once
     return replace(settings, speed_hz=recording.declared_speed_hz)
 
 
 def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Layout:
-    """What a recording offers the catalogue.
+    """Properties of a recording that the catalogue needs.
 
     Parameters
     ----------
     recording : Recording
         With or without tacho.
     settings : Settings
-        Kind of machine, geometry of a bearing.
+        Kind of machine, bearing geometry.
 
     Returns
     -------
@@ -468,9 +467,9 @@ def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Lay
 
 
 def _vibration(recording: Recording, layout: Layout) -> NDArray[np.float32]:
-    """All channels but tacho and cylinder pressures [shape=(n_vibrations, n_samples)]."""
-    aside = layout.cylinders
-    return recording.vibration[~aside] if aside.any() else recording.vibration
+    """All channels except tacho and cylinder pressures [shape=(n_vibrations, n_samples)]."""
+    cylinders = layout.cylinders
+    return recording.vibration[~cylinders] if cylinders.any() else recording.vibration
 
 
 def feature_table(
@@ -481,14 +480,14 @@ def feature_table(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> FeatureTable:
-    """Features of every record of a data set that was simulated without failure.
+    """Features of every usable record of a data set.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
     choice : FeatureSelection
-        Which features.
+        Selected features.
     healthy : Healthy, optional
         Transfer functions of each machine when it was healthy.
     jobs : int
@@ -505,10 +504,10 @@ def feature_table(
     Raises
     ------
     DataError
-        The file cannot be read, or holds no usable record; its records and those of a view do not
-        tell which belong together, or none do.
+        The file cannot be read or holds no usable record; or its records cannot be matched with
+        those of a view.
     """
-    _refuse_strange(choice, path)
+    _refuse_unjoined(choice, path)
     with JoinedSet(Path(path), choice.views) as data:
         usable = _usable(data)
         names = feature_table_names(path, choice, healthy) if data.missing else ()
@@ -538,21 +537,21 @@ def _usable(data: JoinedSet) -> NDArray[np.intp]:
 def feature_table_names(
     path: str | Path, choice: FeatureSelection = USUAL, healthy: Healthy | None = None
 ) -> tuple[str, ...]:
-    """Names of the columns of a feature table, told by the first usable record.
+    """Column names of a feature table, from the first usable record.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
     choice, healthy
-        As of :func:`feature_table`.
+        As in :func:`feature_table`.
 
     Raises
     ------
     DataError
-        There is no usable record, or a feature that is named is not to be had.
+        There is no usable record, or a named feature cannot be computed.
     """
-    _refuse_strange(choice, path)
+    _refuse_unjoined(choice, path)
     with JoinedSet(Path(path), choice.views) as data:
         usable = _usable(data)
         whole = usable[data.complete[usable]]
@@ -571,13 +570,13 @@ def feature_table_names(
     return names
 
 
-def _refuse_strange(choice: FeatureSelection, path: str | Path) -> None:
-    """Features of a view that nobody joined."""
+def _refuse_unjoined(choice: FeatureSelection, path: str | Path) -> None:
+    """Reject features of a view that is not joined."""
     known = {"", *(view.name for view in choice.views)}
-    strange = [name for name in choice.only or () if name.rpartition(MARK)[0] not in known]
-    if strange:
+    unknown = [name for name in choice.only or () if name.rpartition(MARK)[0] not in known]
+    if unknown:
         raise DataError(
-            f"{path}: feature {strange[0]} is of a view that is not joined, must be one of "
+            f"{path}: feature {unknown[0]} is of a view that is not joined, must be one of "
             f"{_listed(choice.views)}; give --join"
         )
 
@@ -618,13 +617,13 @@ def _batch_features(
 def _placed(
     names: tuple[str, ...], values: NDArray[np.float64], planned: tuple[str, ...]
 ) -> NDArray[np.float64]:
-    """A row with NaN for what it lacks."""
+    """Row of the planned features, with NaN for missing ones."""
     found = dict(zip(names, values, strict=True))
     return np.array([found.get(name, np.nan) for name in planned])
 
 
 def recording_transfer(recording: Recording, settings: Settings = STANDARD) -> Transfer | None:
-    """Transfer functions of a test, as its features are told from them.
+    """Transfer functions of a test, as used for its features.
 
     Parameters
     ----------
@@ -634,7 +633,7 @@ def recording_transfer(recording: Recording, settings: Settings = STANDARD) -> T
     Returns
     -------
     Transfer or None
-        None where there is no force, no response, or too short a record.
+        None without a force or a response, or if the record is too short.
 
     Raises
     ------
@@ -651,7 +650,7 @@ def recording_transfer(recording: Recording, settings: Settings = STANDARD) -> T
 
 
 def recording_analysis(recording: Recording, settings: Settings = STANDARD) -> Analysis | None:
-    """Transforms of a test; None where a recording has no transfer function to tell.
+    """Analysis of a test; None if a recording has no transfer function.
 
     Parameters
     ----------
@@ -666,7 +665,7 @@ def recording_analysis(recording: Recording, settings: Settings = STANDARD) -> A
 
 
 def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[str, int]:
-    """How the blows of a data set's impact tests were averaged, and what is lost in noise.
+    """Notes on the averaging of a data set's impact tests, and on lines lost in noise.
 
     Parameters
     ----------
@@ -677,8 +676,8 @@ def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[st
     Returns
     -------
     dict
-        Text -> records it holds for; empty where no force is that of a hammer, and every line of
-        every transfer function is heard.
+        Text -> number of records; empty without hammer tests, if every line of every transfer
+        function is usable.
     """
     notes: Counter[str] = Counter()
     lost: list[float] = []
@@ -689,7 +688,7 @@ def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[st
                 continue
             if found.struck:
                 notes[f"impact test, {found.words}"] += 1
-            if found.masked.max() >= _TOLD_LOSS:
+            if found.masked.max() >= _LEAST_LOSS:
                 lost.append(float(found.masked.max()))
     if lost:
         notes[
@@ -699,11 +698,11 @@ def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[st
     return dict(notes)
 
 
-_TOLD_LOSS = 0.1  # of the lines: chance alone leaves out hardly any
+_LEAST_LOSS = 0.1  # of the lines, to be reported: chance alone loses hardly any
 
 
 def _same_names(where: str | Path, names: tuple[str, ...], found: tuple[str, ...]) -> None:
-    """Refuse records whose rows differ: one lacks the speed that the others have."""
+    """Reject records with different features, e.g. if one lacks the speed."""
     odd = sorted(set(names) ^ set(found))
     if odd:
         struck_only = any("frf." in name for name in odd)
@@ -718,7 +717,7 @@ def _same_names(where: str | Path, names: tuple[str, ...], found: tuple[str, ...
 
 
 def save_table(table: FeatureTable, path: str | Path, *, force: bool = True) -> None:
-    """Write a feature table as Parquet, CSV or HDF5, by the suffix.
+    """Write a feature table as Parquet, CSV or HDF5, depending on the suffix.
 
     Parameters
     ----------
@@ -731,7 +730,7 @@ def save_table(table: FeatureTable, path: str | Path, *, force: bool = True) -> 
     Raises
     ------
     DataError
-        The suffix is none of them, the folder does not exist, or Parquet is not installed.
+        The suffix is none of these, the folder does not exist, or Parquet is not installed.
     """
     target = Path(path)
     if target.suffix not in _WRITERS:

@@ -1,6 +1,6 @@
-"""What a model says of itself: the card in its file, and what a recording must have for it.
+"""Card of a model in its file, and the layout that its recordings must have.
 
-Kept as the tables of JSON that they are in the file; a name that a card lacks is a fault of types.
+The classes mirror the JSON tables in the file, so that a missing name is a type error.
 """
 
 from collections.abc import Sequence
@@ -16,30 +16,30 @@ from ...sim.output.sensor import RATE_LEAST, RATE_MOST, Channel
 from ..learning.grades import GRADE_NAMES
 from .noted import NOTED
 
-_MOST_PULSES = 10**6  # of a tacho in a revolution: an encoder of 20 bit
+_MOST_PULSES = 10**6  # per revolution: a 20-bit encoder
 
 RateHz = Annotated[float, Field(ge=RATE_LEAST, le=RATE_MOST)]
-"""Sample rate that a recording can have [Hz]."""
+"""Sample rate of a recording [Hz]."""
 
 Pulses = Annotated[int, Field(ge=1, le=_MOST_PULSES)]
-"""Pulses of a tacho in a revolution."""
+"""Pulses of a tacho per revolution."""
 
 Portion = Annotated[float, Field(ge=0, le=1)]
 """A share, rate or probability."""
 
 
 class Strict(BaseModel):
-    """A table that holds what it must and nothing else; no number in it is infinite or none."""
+    """A table with exactly the declared entries; all numbers are finite."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True, frozen=True)
 
     def table(self) -> dict[str, Any]:
-        """As JSON has it: what was given, without what is taken for granted."""
+        """Table as in JSON: entries that were given, without defaults."""
         return self.model_dump(exclude_unset=True)
 
 
 class SetCard(Strict):
-    """One set of features that was looked at."""
+    """One candidate feature set."""
 
     name: str
     values: int = Field(ge=1)
@@ -47,7 +47,7 @@ class SetCard(Strict):
 
 
 class FeatureChoice(Strict):
-    """Features that a model was trained on, and the sets that they were chosen among."""
+    """Features that a model was trained on, and the candidate sets."""
 
     set: SetName = "standard"
     only: list[str] = Field(default=[], max_length=100_000)
@@ -66,7 +66,7 @@ class ChannelCard(Strict):
 
 
 def check_channels(channels: Sequence[ChannelCard], tacho: str | None) -> None:
-    """Refuse channels that are not told apart by name, or a tacho that is none of them.
+    """Reject channels with equal names, or a tacho that is none of them.
 
     Raises
     ------
@@ -88,7 +88,7 @@ _Worn = Annotated[float, Field(ge=0, le=_MOST_WEAR_M)]
 
 
 class TrainedOn(Strict):
-    """What a model was trained on, and how records were held out."""
+    """Training data of a model, and how records were held out."""
 
     records: int = Field(ge=1)
     draws: int = Field(ge=1)
@@ -104,14 +104,14 @@ class TrainedOn(Strict):
 
 
 class HealthyFeatures(Strict):
-    """Features of as-new machines, one number for each."""
+    """Features of as-new machines, one number per feature."""
 
     mean: list[float]
     spread: list[float]
 
 
 class TrainedCondition(Strict):
-    """Range of an operating condition; without a feature it was noted beside the recording."""
+    """Range of an operating condition; without a feature it was noted with the recording."""
 
     name: str
     feature: str
@@ -130,7 +130,7 @@ class TriedModel(Strict):
 
 
 class ChosenModel(Strict):
-    """What was chosen among the candidates, and how it errs."""
+    """The chosen model and its errors."""
 
     chosen: str
     members: dict[str, float]
@@ -140,7 +140,7 @@ class ChosenModel(Strict):
 
 
 class ConfounderRates(Strict):
-    """How a fault beside the wear is found, and what it does to the estimate."""
+    """Detection of a fault other than the wear, and its effect on the estimate."""
 
     name: str
     share: Portion
@@ -153,9 +153,9 @@ class ConfounderRates(Strict):
 
 
 class StrangerRates(Strict):
-    """How recordings of a kind that a model must refuse are told from familiar ones.
+    """How recordings of a kind that a model must refuse are distinguished from familiar ones.
 
-    Rates are of machines without part in the fit: of this kind refused, and of familiar ones.
+    Rates are from machines not used in the fit: refused share of this kind and of familiar ones.
     """
 
     name: str
@@ -165,7 +165,7 @@ class StrangerRates(Strict):
 
 
 class LayoutCard(Strict):
-    """What a recording must have to be an input of a model, or one of its views."""
+    """Required layout of a recording that is an input of a model, or of one of its views."""
 
     channels: list[ChannelCard] = Field(min_length=1)
     sample_rate_hz: RateHz
@@ -178,19 +178,19 @@ class LayoutCard(Strict):
         return self
 
     def recording_of(self, given: Recording | NDArray[Any] | Table, fs: float | None) -> Recording:
-        """A recording as it is; an array or a table with the channels of the model.
+        """Return a recording unchanged; give an array or a table the channels of the model.
 
         Parameters
         ----------
         given : Recording, numpy.ndarray [shape=(n_channels, n_samples)] or pandas.DataFrame
-            Channels in the order and units of the model's; a table has a column for each.
+            Channels in the order and units of the model; a table has one column per channel.
         fs : float or None
             Sample rate of an array or a table [Hz]; a recording has its own.
 
         Raises
         ------
         DataError
-            An array has no rate or other channels, or a recording is given a rate.
+            An array has no rate or other channels, or a rate is given for a recording.
         """
         if isinstance(given, Recording):
             return as_recording(given, fs)
@@ -200,7 +200,7 @@ class LayoutCard(Strict):
 
 
 class ModelCard(LayoutCard):
-    """What the card of a wear model must hold, so that nothing that reads it can fail."""
+    """Card of a wear model, validated so that readers need no checks."""
 
     created_by: str
     origin: Literal["simulated", "measured"]
@@ -244,7 +244,7 @@ class ModelCard(LayoutCard):
         return self
 
     def _ranges(self) -> list[tuple[str, tuple[float, float]]]:
-        """What has a low and a high end."""
+        """Entries with a low and a high end."""
         low, high = self.severity_range_m
         return [
             ("severity_range_m", (low, high)),
@@ -253,12 +253,12 @@ class ModelCard(LayoutCard):
 
     @property
     def noted_names(self) -> tuple[str, ...]:
-        """Conditions that varied where the model was trained and that its signals do not tell."""
+        """Conditions that varied in training and cannot be inferred from the signals."""
         return tuple(one.name for one in self.conditions if not one.feature)
 
 
 class ClassCard(LayoutCard):
-    """The same of a model of named conditions."""
+    """Card of a model of named conditions."""
 
     created_by: str
     origin: Literal["simulated", "measured"]

@@ -1,4 +1,4 @@
-"""Operating conditions that no vibration tells, noted beside a recording: inputs of a model."""
+"""Operating conditions noted with a recording, as inputs of a model: vibration lacks them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 
-_LEAST = 1e-9  # in SI units, of a condition whose logarithm is taken
+_LEAST = 1e-9  # SI units, lower bound of a condition whose logarithm is used
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,15 +21,14 @@ class Noted:
     ----------
     unit : str
     doubt : float
-        Standard uncertainty of what people note: over the value, or over the trained range where
-        the value may be 0 or negative.
+        Standard uncertainty of noted values: over the value, or over the trained range if the value
+        may be 0 or negative.
     log : bool
-        It acts by its ratio: its logarithm is the input.
+        Its effect depends on ratios: its logarithm is the input.
     setting : str
-        How a person gives it.
+        How the user gives it.
     usual : float, optional
-        Taken where nobody noted it, as in half of the training records; without one it must be
-        known.
+        Value used if it was not noted, as in half of the training records; None: it must be known.
     """
 
     unit: str
@@ -54,10 +53,10 @@ NOTED = {
         unit="K", doubt=0.07, log=False, setting='bearings.0.film_warming="8 K"', usual=4.0
     ),
 }
-"""Manifest column -> what it is. Gauges of pressure are read to 2 %, a viscosity from the oil's
-temperature is known to a kelvin, thrust from the shaft's torque. Few read a bearing's thermometer,
-to a kelvin of 15: without it a film is 4 K warmer than the oil noted, as the shaft's recipe has it
-on average."""
+"""Manifest column -> condition. Pressure gauges are read to 2 %, the viscosity follows from the
+oil's temperature within a kelvin, thrust from the shaft's torque. The film's warming needs a
+bearing thermometer, which is rarely read, to a kelvin of 15: by default the film is 4 K warmer than
+the noted oil, the average of the shaft's recipe."""
 
 _UNNOTED = 0.5  # of the training records, where a condition need not be known
 
@@ -70,12 +69,12 @@ def noted_values(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Flo
     names : sequence of str
         Keys of :data:`NOTED`.
     rows : sequence of mapping
-        What was noted beside each recording, in SI units.
+        Conditions noted with each recording, in SI units.
 
     Returns
     -------
     numpy.ndarray [shape=(n_rows, n_names)]
-        NaN where nothing was noted, or what is usual.
+        NaN, or the usual value, for conditions not noted.
 
     Examples
     --------
@@ -93,7 +92,7 @@ def noted_values(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Flo
 
 
 def given_of(names: Sequence[str], row: Mapping[str, Any]) -> tuple[str, ...]:
-    """Those of the conditions that somebody noted beside a recording.
+    """Conditions that were noted with a recording.
 
     Examples
     --------
@@ -108,19 +107,19 @@ def _number(value: Any) -> float:
 
 
 def doubted(names: Sequence[str], values: Float, seed: int) -> Float:
-    """Conditions as people would have noted them: each off by what it is known to, or not at all.
+    """Conditions as they would have been noted: with an error of their uncertainty, or missing.
 
     Parameters
     ----------
     names : sequence of str
     values : numpy.ndarray [shape=(n, n_names)]
-        Of :func:`noted_values`.
+        From :func:`noted_values`.
     seed : int
 
     Returns
     -------
     numpy.ndarray [shape=(n, n_names)]
-        Of conditions with a usual value, that value in half of the rows.
+        Conditions with a usual value have that value in half of the rows.
     """
     doubts = [
         NOTED[name].doubt * (1.0 if NOTED[name].log else np.ptp(values[:, i]))
@@ -135,7 +134,7 @@ def doubted(names: Sequence[str], values: Float, seed: int) -> Float:
 
 
 def strayed(names: Sequence[str], values: Float, seed: int, reach: float) -> Float:
-    """Conditions of machines for which they mean something else: another oil, a load elsewhere.
+    """Conditions of machines for which they have another meaning: another oil, another load.
 
     Parameters
     ----------
@@ -144,7 +143,7 @@ def strayed(names: Sequence[str], values: Float, seed: int, reach: float) -> Flo
         Of :func:`noted_values`.
     seed : int
     reach : float
-        Each is off by a factor of up to this; where it may be 0, by as large a share of its range.
+        Largest factor by which each is off; if it may be 0, as large a share of its range.
 
     Returns
     -------
@@ -158,6 +157,6 @@ def strayed(names: Sequence[str], values: Float, seed: int, reach: float) -> Flo
 
 
 def notes_of(manifest: pd.DataFrame) -> list[dict[str, Any]]:
-    """Manifest values of each record by name."""
+    """Manifest values of each record, by name."""
     rows = manifest.to_dict("records")
     return [{str(name): value for name, value in row.items()} for row in rows]

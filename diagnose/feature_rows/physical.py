@@ -1,9 +1,9 @@
-"""Feature rows brought down to what one machine of a kind shares with the next.
+"""Feature rows reduced to properties that machines of one kind share.
 
-Where its energy lies in the turn, in which wide bands, how it spreads over the orders, how spiky
-the signal is: none of that hangs on the level, which speed, load and sensor decide, and little on
-where exactly the casing resonates. Narrow bands are the opposite, and say most about the wear.
-How far even wide bands follow a resonance is told by :func:`moved_rows`.
+These are the distribution of the energy over the revolution, over wide bands and over the orders,
+and how impulsive the signal is. They do not depend on the level, which speed, load and sensor
+determine, and little on the exact resonances of the casing. Narrow bands are the opposite, and the
+most informative on the wear. :func:`moved_rows` shows how far even wide bands follow a resonance.
 """
 
 import re
@@ -21,30 +21,30 @@ Float = NDArray[np.float64]
 LEVELS = ("rms", "peak", "peak_to_peak")
 """Features in the unit of the channel."""
 
-_WIDE_BANDS = 5  # of a spectrum of 20: each three bands either way, where modes move by one
-_ANGLE_STEP = 2  # bins of a profile between two kept ones, after smoothing over one either way
+_WIDE_BANDS = 5  # of a spectrum of 20: three bands either side, while modes shift by one
+_ANGLE_STEP = 2  # every second bin of a profile is kept, after smoothing over one either side
 _LEAST_FACTOR = 1e-3  # a dead channel has 0
-_SILENCE = 1e-12  # mean square beside which nothing is heard
+_SILENCE = 1e-12  # mean square that avoids the logarithm of zero
 _SPEED = "shaft.speed_hz"
 _CONDITIONS = (_SPEED, "shaft.speed_variation")
 
 
 @dataclass(kw_only=True)
 class Columns:
-    """Where the features of one channel, pair, shaft or orbit stand in a row.
+    """Columns of the features of one channel, pair, shaft or orbit.
 
     Attributes
     ----------
     level, bands, orders, spiky, again, other : list of int
         Levels of :data:`LEVELS`; band levels from low to high; order levels; shape factors and
-        kurtoses; what the crank-angle map says already, where a trait would count twice; all the
-        rest but the speed.
+        kurtoses; features that the crank-angle map already contains, which would count twice; the
+        others except the speed.
     edges : list of (float, float)
-        Of the bands [Hz].
+        Edges of the bands [Hz].
     cells : list of int
         Levels of the crank-angle map, angle by angle, from low to high band.
     angles : int
-        Its angles.
+        Number of its angles.
     """
 
     level: list[int] = field(default_factory=list)
@@ -78,7 +78,7 @@ def columns_of(names: tuple[str, ...]) -> dict[str, Columns]:
         cell = re.fullmatch(_CELL, label)
         if band:
             columns.edges.append((float(band[1]), float(band[2])))
-        if cell:  # the row has them angle by angle, bands rising
+        if cell:  # ordered by angle, then by band
             seen.setdefault(owner, set()).add(cell[1])
             columns.angles = len(seen[owner])
         _list_of(columns, label).append(i)
@@ -107,20 +107,20 @@ def _list_of(columns: Columns, label: str) -> list[int]:
 
 
 def physical_rows(names: Sequence[str], rows: Float) -> Float:
-    """Feature rows in the physical space.
+    """Feature rows in physical coordinates.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
 
     Returns
     -------
     numpy.ndarray [shape=(n, n_physical)]
-        Per channel: energy over the crank angle in decibels of its mean, smoothed; energy in five
-        wide, overlapping bands and of the orders, in decibels of their sum and mean; logarithms of
-        the shape factors and kurtoses; everything else but level and speed as it is.
+        Per channel: energy over the crank angle in decibels re its mean, smoothed; energy in five
+        wide, overlapping bands and of the orders, in decibels re their sum and mean; logarithms of
+        the shape factors and kurtoses; all others except level and speed unchanged.
 
     Examples
     --------
@@ -135,14 +135,14 @@ def physical_rows(names: Sequence[str], rows: Float) -> Float:
 
 @dataclass(frozen=True, kw_only=True)
 class Coordinates:
-    """What the physical coordinates are of.
+    """Description of the physical coordinates.
 
     Attributes
     ----------
     owner : numpy.ndarray [shape=(n_physical,)]
         Channel, pair, shaft or orbit.
     kind : numpy.ndarray [shape=(n_physical,)]
-        Way of looking at it: ``profile``, ``wide``, ``orders``, ``spiky``, ``orbit``, ``other``.
+        ``profile``, ``wide``, ``orders``, ``spiky``, ``orbit`` or ``other``.
     """
 
     owner: NDArray[np.str_]
@@ -155,7 +155,7 @@ def coordinates_of(names: Sequence[str]) -> Coordinates:
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
 
     Returns
     -------
@@ -180,22 +180,22 @@ def coordinates_of(names: Sequence[str]) -> Coordinates:
 def moved_rows(
     names: Sequence[str], rows: Float, factor: float | Float, *, cells: bool = False
 ) -> Float:
-    """Feature rows of machines whose spectra stand at other frequencies.
+    """Feature rows of machines with spectra shifted in frequency.
 
     Parameters
     ----------
     names, rows
-        As of :func:`physical_rows`.
+        As in :func:`physical_rows`.
     factor : float or numpy.ndarray [shape=(n,)]
-        Of all frequencies, of each row.
+        Factor of all frequencies, for each row.
     cells : bool
-        Whether the spectra at each crank angle move as well.
+        Whether to shift the spectra at each crank angle as well.
 
     Returns
     -------
     numpy.ndarray [shape=(n, n_features)]
-        Band levels as read off a spectrum moved by the factor, interpolated in the logarithm of the
-        frequency and held beyond the ends; all other features as they are.
+        Band levels of a spectrum shifted by the factor, interpolated in the logarithm of the
+        frequency and held constant beyond the ends; all other features unchanged.
 
     Examples
     --------
@@ -218,19 +218,19 @@ def moved_rows(
 
 
 def turned_rows(names: Sequence[str], row: Float) -> Float:
-    """One feature row as it would be with the mark of the turn elsewhere.
+    """One feature row at all positions of the once-per-turn mark.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     row : numpy.ndarray [shape=(n_features,)]
 
     Returns
     -------
     numpy.ndarray [shape=(n_angles, n_features)]
-        The crank-angle maps of all channels turned on by none, one, … of their angles, which is a
-        mark that came so much late; a single row where there is no map.
+        Crank-angle maps of all channels rotated by zero, one, … of their angles, as with a mark
+        that is late by as much; a single row without a map.
 
     Examples
     --------
@@ -248,7 +248,7 @@ def turned_rows(names: Sequence[str], row: Float) -> Float:
 
 
 def _moved(levels: Float, edges: Sequence[tuple[float, float]], steps: Float) -> Float:
-    """Spectra [shape=(n, n_bands)] moved by steps of the log frequency [shape=(n,)]."""
+    """Spectra [shape=(n, n_bands)] shifted by steps of the log frequency [shape=(n,)]."""
     middle = np.log(edges).mean(axis=1)
     place = np.interp(middle - steps[:, None], middle, np.arange(len(middle)))
     below = np.minimum(place.astype(np.intp), max(len(middle) - 2, 0))
@@ -259,7 +259,7 @@ def _moved(levels: Float, edges: Sequence[tuple[float, float]], steps: Float) ->
 
 def _edges_of(name: str) -> tuple[float, float]:
     found = re.search(_BAND, name)
-    assert found is not None  # a cell's name ends in that of a band
+    assert found is not None  # the name of a cell ends with that of a band
     return float(found[1]), float(found[2])
 
 
@@ -284,7 +284,7 @@ def _parts(columns: Columns, rows: Float) -> dict[str, Float]:
 
 
 def _profile(energy: Float) -> Float:
-    """Energy over the angle, relative, smoothed round the circle."""
+    """Relative energy over the angle, smoothed periodically."""
     level = 10 * np.log10(energy / _total(energy, np.mean) + _SILENCE)
     around = np.roll(level, 1, axis=1) + np.roll(level, -1, axis=1)
     return np.asarray((level / 2 + around / 4)[:, ::_ANGLE_STEP])
@@ -310,18 +310,18 @@ def _total(energy: Float, how: Callable[..., Float]) -> Float:
 
 
 def shape_rows(names: Sequence[str], rows: Float) -> Float:
-    """What tells the level to expect of each channel, itself free of every level.
+    """Level-independent features that predict the level of each channel.
 
     Parameters
     ----------
     names, rows
-        As of :func:`physical_rows`.
+        As in :func:`physical_rows`.
 
     Returns
     -------
     numpy.ndarray [shape=(n, n_shapes)]
-        The physical coordinates of every channel that has a level, but for `other`; and the
-        logarithm of the speed, where there is one.
+        Physical coordinates of every channel with a level, except `other`, and the logarithm of the
+        speed, if known.
 
     Examples
     --------
@@ -354,14 +354,14 @@ def level_rows(names: Sequence[str], rows: Float) -> Float:
 
 
 def levelled_rows(names: Sequence[str], rows: Float, excess_db: Float) -> Float:
-    """Feature rows as they would be at other levels of the channels.
+    """Feature rows at other levels of the channels.
 
     Parameters
     ----------
     names, rows
-        As of :func:`physical_rows`.
+        As in :func:`physical_rows`.
     excess_db : numpy.ndarray [shape=(n, n_channels)]
-        To take away from each channel of :func:`level_channels` [dB].
+        Level to be subtracted from each channel of :func:`level_channels` [dB].
 
     Returns
     -------

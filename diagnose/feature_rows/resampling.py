@@ -1,4 +1,4 @@
-"""Recordings at other sample rates than their own."""
+"""Resampling of recordings."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -7,7 +7,7 @@ import numpy as np
 
 from ...sim.output.recording import Recording
 
-_MOST_PARTS = 1000  # of the ratio of two rates: any is met to a millionth
+_MOST_PARTS = 1000  # largest denominator of a ratio of rates: accurate to a millionth
 
 
 def at_rate(recording: Recording, rate: float) -> Recording:
@@ -22,7 +22,7 @@ def at_rate(recording: Recording, rate: float) -> Recording:
     Returns
     -------
     Recording
-        As it was where it is no faster.
+        Unchanged if its rate is not higher.
 
     Examples
     --------
@@ -46,13 +46,13 @@ def resampled(recording: Recording, ratio: float) -> Recording:
     ----------
     recording : Recording
     ratio : float
-        How many times as fast as stated.
+        True over stated sample rate.
 
     Returns
     -------
     Recording
-        Vibration is filtered before samples are left out; the tacho is read between its samples, as
-        a filter would ring at its edges.
+        Vibration is filtered before decimation; the tacho is interpolated, because a filter would
+        ring at its edges.
     """
     from scipy.signal import resample_poly
 

@@ -1,4 +1,4 @@
-"""Healthy recordings of the machine in question: the reference that the trade works with."""
+"""Healthy recordings of a machine, the usual reference in condition monitoring."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -35,12 +35,12 @@ from .transfer_reference import (
 
 Float = NDArray[np.float64]
 
-_ENOUGH_FAULTS = 5  # recordings with the same fault that need not be looked beyond
+_ENOUGH_FAULTS = 5  # recordings with the same fault after which reading stops
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """Healthy recordings of the machine in question.
+    """Healthy recordings of a machine, as reference of its other recordings.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Baseline:
     source : str
         File or files, for messages.
     transfer : FrfReference or None
-        Mean of their transfer functions, where the model is told against them.
+        Mean of their transfer functions, if the model compares with them.
     positions : tuple of ProbeMeans
-        Where the shaft ran in each; empty without proximity probes.
+        Shaft position in each; empty without proximity probes.
     """
 
     features: Float
@@ -63,7 +63,7 @@ class Baseline:
 
 
 def referenced_rows(rows: Float, baseline: Float) -> Float:
-    """Feature rows as a referenced model takes them.
+    """Input rows of a referenced model.
 
     Parameters
     ----------
@@ -74,8 +74,7 @@ def referenced_rows(rows: Float, baseline: Float) -> Float:
     Returns
     -------
     numpy.ndarray [shape=(n, 2 n_features)]
-        What changed since the machine was healthy (levels are logarithms: their ratio), and the
-        rows as they are.
+        Change from the healthy state (for logarithmic levels a ratio), and the unchanged rows.
 
     Examples
     --------
@@ -94,19 +93,19 @@ def references(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> tuple[Float, int]:
-    """Mean healthy row of the machine of each record, paired by what tells the machine.
+    """Mean healthy row of the machine of each record, matched by machine identity.
 
     Parameters
     ----------
     table : FeatureTable
-        Records in question.
+        Records to be referenced.
     path : str or Path
         Their data set.
     healthy : str or Path
-        Data set of healthy records of the same machines: drawn by the same recipe under the same
-        seed, or measured and named alike. Equal numbers alone make no machine the same.
-    choice : Choice
-        What the table is made of, or holds a part of.
+        Data set of healthy records of the same machines: drawn by the same recipe with the same
+        seed, or measured with the same names. Equal numbers alone do not identify a machine.
+    choice : FeatureSelection
+        Features of the table, or a superset.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -116,12 +115,12 @@ def references(
     -------
     rows : numpy.ndarray [shape=(n_records, n_features)]
     records : int
-        Healthy records in all.
+        Total number of healthy records.
 
     Raises
     ------
     DataError
-        As of :func:`refuse_strangers`, or the features are others.
+        As in :func:`refuse_strangers`, or the features differ.
     """
     refuse_strangers(path, healthy)
     against = healthy_transfer(healthy, [FeatureSelection(only=table.names)])
@@ -136,12 +135,12 @@ def references(
 
 
 def refuse_strangers(path: str | Path, healthy: str | Path) -> None:
-    """Refuse a healthy set that is not known to be of the machines of another set.
+    """Reject a healthy set that is not known to be of the machines of another set.
 
     Parameters
     ----------
     path, healthy : str or Path
-        As of :func:`references`.
+        As in :func:`references`.
 
     Raises
     ------
@@ -171,7 +170,7 @@ _SAME_MACHINES = (
 
 
 def _machines_in(path: str | Path) -> NDArray[np.str_]:
-    """Machine of each usable record, as the rows of its feature table."""
+    """Machine of each usable record, in the order of the feature table."""
     with DataSet(path) as data:
         usable = (data.manifest["status"] == "ok").to_numpy()
         return np.array(data.machines, dtype=str)[usable]
@@ -211,15 +210,15 @@ def _few(numbers: Sequence[object]) -> str:
 def baseline_of(
     recordings: Iterable[Recording], card: ModelCard, source: str = "baseline"
 ) -> Baseline:
-    """Healthy recordings of one machine, as a model takes them.
+    """Baseline of a model from healthy recordings of one machine.
 
     Parameters
     ----------
     recordings : iterable of Recording
     card : ModelCard
-        Of the model.
+        Card of the model.
     source : str
-        Where they are from, for messages.
+        Origin of the recordings, for messages.
 
     Returns
     -------
@@ -228,7 +227,7 @@ def baseline_of(
     Raises
     ------
     DataError
-        There is no recording, or some lack the model's inputs or are at fault; each fault once.
+        There is no recording, or some lack the model's inputs or have faults; each fault once.
     """
     sound: list[Recording] = []
     faults: dict[str, list[str]] = {}
@@ -242,12 +241,12 @@ def baseline_of(
         for text in found:
             faults.setdefault(text, []).append(recording.source or str(i))
         if len(next(iter(faults.values()), ())) > _ENOUGH_FAULTS:
-            break  # of a thousand recordings of another layout
+            break  # all others probably have the same layout
         if not found:
             sound.append(recording)
     if faults:
-        told = [f"{source}: {text} ({_few(names)})" for text, names in faults.items()]
-        raise DataError("\n".join(told))
+        lines = [f"{source}: {text} ({_few(names)})" for text, names in faults.items()]
+        raise DataError("\n".join(lines))
     if not sound:
         raise DataError(f"{source}: 0 healthy recordings, must be >= 1; record some")
     named = FeatureSelection(only=tuple(card.features))
@@ -273,21 +272,21 @@ def baseline_of(
 
 
 class Baselines:
-    """Healthy recordings in a data set: of the machine in question, or of several by identity.
+    """Healthy recordings in a data set, of one machine or of several.
 
     Parameters
     ----------
     path : str or Path
-        Data set. Machines go by :attr:`wearstate.datasets.file.record.DataSet.machines`, never by
-        number; a set of one machine, or of files without names, is taken to be of the machine of
-        a recording that does not tell its own.
+        Data set. Machines are identified by
+        :attr:`wearstate.datasets.file.record.DataSet.machines`, never by number. A recording
+        without a machine name is matched with a set of one machine, or of files without names.
     card : ModelCard
-        Of the model.
+        Card of the model.
 
     Raises
     ------
     DataError
-        It is no data set, cannot be read, or a recording in it is not healthy.
+        The file is not a data set, cannot be read, or contains a recording that is not healthy.
     """
 
     def __init__(self, path: str | Path, card: ModelCard) -> None:
@@ -308,12 +307,12 @@ class Baselines:
         self._found: dict[str, Baseline] = {}
 
     def of(self, recording: Recording) -> Baseline:
-        """That of the machine of a recording; read when it is first asked for.
+        """Baseline of the machine of a recording, read on first use.
 
         Parameters
         ----------
         recording : Recording
-            In question.
+            Recording to be compared.
 
         Returns
         -------
@@ -322,10 +321,10 @@ class Baselines:
         Raises
         ------
         DataError
-            It is not known to be of a machine in the set; as of :func:`baseline_of`.
+            Its machine is not known to be in the set; or as in :func:`baseline_of`.
         """
         machine = recording.machine
-        self._refuse_stranger(machine, recording.source or "the recording")
+        self._refuse_unknown(machine, recording.source or "the recording")
         if machine not in self._found:
             records = self._records[self._machines == machine] if machine else self._records
             with DataSet(self._path) as data:
@@ -333,19 +332,19 @@ class Baselines:
                 self._found[machine] = baseline_of(healthy, self._card, self.source)
         return self._found[machine]
 
-    def _refuse_stranger(self, machine: str, name: str) -> None:
+    def _refuse_unknown(self, machine: str, name: str) -> None:
         known = sorted(set(self._machines.tolist()))
         if machine in known or len(known) == 0:
-            return  # without any, reading tells
-        here = _few([one or "a machine without a name" for one in known])
+            return  # an empty set fails on reading
+        machines = _few([one or "a machine without a name" for one in known])
         if machine:
             raise DataError(
-                f"{self.source} has healthy recordings of {here}, must have some of {machine}, "
-                f"which {name} is of; {_SAME_MACHINES}"
+                f"{self.source} has healthy recordings of {machines}, must have some of {machine}, "
+                f"the machine of {name}; {_SAME_MACHINES}"
             )
         if len(known) > 1:
             raise DataError(
-                f"{self.source} has healthy recordings of {len(known)} machines ({here}), must "
+                f"{self.source} has healthy recordings of {len(known)} machines ({machines}), must "
                 f"have those of one: {name} does not name its machine; give a data set of its "
                 "recordings only"
             )

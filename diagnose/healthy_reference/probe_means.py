@@ -1,4 +1,4 @@
-"""Where the shaft runs in a recording: mean readings of its proximity probes, and its speed."""
+"""Shaft position in a recording: mean readings of its proximity probes, and its speed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class ProbeMeans:
-    """What a static equilibrium is told from.
+    """Measured input of a static equilibrium.
 
     Attributes
     ----------
     names : tuple of str
-        Of the channels of displacement, in the recording's order.
+        Displacement channels, in the order of the recording.
     means, swings : numpy.ndarray [shape=(n_probes,)]
         Mean reading and rms about it [m].
     speed_hz : float or None
-        Of the shaft: by the tacho, else as noted.
+        Speed of the shaft, from the tacho, else as noted.
     row : mapping
-        What was noted beside the recording.
+        Conditions noted with the recording.
     """
 
     names: tuple[str, ...]
@@ -37,7 +37,7 @@ class ProbeMeans:
 
 
 def probe_means(recording: Recording) -> ProbeMeans:
-    """Mean readings in a recording; without probes there are none.
+    """Mean readings in a recording; empty without probes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Transfer functions of the healthy machine: what those of a later test are held against."""
+"""Transfer functions of the healthy machine, as reference of later tests."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,15 +24,15 @@ def transfer_reference(
     Parameters
     ----------
     recordings : iterable of Recording
-        Tests of the same forces and responses; of impact tests those whose blocks are as long as
-        the first one's are averaged.
+        Tests with the same forces and responses; only impact tests with the block length of the
+        first are averaged.
     modes : bool
-        Whether to fit the modes of the mean, too.
+        Whether to fit the modes of the mean as well.
 
     Returns
     -------
     FrfReference or None
-        None where no recording is a test.
+        None if no recording is a test.
     """
     tests = [recording_analysis(recording, STANDARD) for recording in recordings]
     known = [test for test in tests if test is not None]
@@ -62,7 +62,7 @@ _OF_FUNCTIONS = ("frf_assurance", ".frf.assurance", *_OF_MODES)
 
 
 def told_against_modes(choice: FeatureSelection) -> bool:
-    """Whether a feature of a choice is told against the modes of a reference.
+    """Whether a feature of a choice is relative to the modes of a reference.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def told_against_modes(choice: FeatureSelection) -> bool:
 
 
 def told_against(choice: FeatureSelection) -> bool:
-    """Whether a feature of a choice is told against a reference, where there is a force.
+    """Whether a feature of a choice is relative to a reference, given a force.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def told_against(choice: FeatureSelection) -> bool:
 
 
 def _modes(test: Analysis, whole: Any) -> Modes:
-    """Modes of the mean functions; none where no pole is stable."""
+    """Modes of the mean functions; empty if no pole is stable."""
     found = test.modes_of(whole)
     if found is not None:
         return found
@@ -110,14 +110,14 @@ def _modes(test: Analysis, whole: Any) -> Modes:
 
 @dataclass(frozen=True, kw_only=True)
 class HealthyTransfer:
-    """Reference of each machine of a healthy data set, made when it is first asked for.
+    """Reference of each machine of a healthy data set, computed on first use.
 
     Attributes
     ----------
     path : Path
         Data set of healthy records.
     modes : bool
-        As of :func:`transfer_reference`.
+        As in :func:`transfer_reference`.
     """
 
     path: Path
@@ -125,11 +125,11 @@ class HealthyTransfer:
     _found: dict[str, FrfReference | None] = field(default_factory=dict, repr=False, compare=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What a worker process is sent: it makes the references that it needs itself."""
+        """Pickle without the references: a worker process computes those it needs."""
         return partial(HealthyTransfer, path=self.path, modes=self.modes), ()
 
     def of(self, machine: str) -> FrfReference | None:
-        """That of a machine; None where it has no healthy test."""
+        """Reference of a machine; None if it has no healthy test."""
         if machine not in self._found:
             with DataSet(self.path) as data:
                 mine = np.array(data.machines, dtype=str) == machine
@@ -142,7 +142,7 @@ class HealthyTransfer:
 def healthy_transfer(
     path: str | Path | None, choices: Sequence[FeatureSelection]
 ) -> HealthyTransfer | None:
-    """References of a healthy data set, where a feature is told against them.
+    """References of a healthy data set; None if no feature is relative to them.
 
     Parameters
     ----------

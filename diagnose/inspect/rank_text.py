@@ -135,7 +135,7 @@ def rank_lines(found: RankedSet) -> list[str]:
     best = ranking.features[0]
     lines = [
         f"{best.name} says most about {found.target}: {plain(best.information)} bits",
-        f"{len(ranking.telling)} of {len(ranking.features)} features say more than chance "
+        f"{len(ranking.informative)} of {len(ranking.features)} features say more than chance "
         f"({plain(ranking.chance)} bits; a shuffled target stays below it in 95 of 100 features)",
     ]
     if not found.classes and ranking.n_followed < ranking.n_machines:
