@@ -123,7 +123,7 @@ def rank_features(
     >>> wear = rng.random(200)
     >>> table = np.column_stack([rng.random(200), wear**3])
     >>> found = rank_features(["noise", "level"], table, wear, np.arange(200) // 10)
-    >>> [each.name for each in found.telling], round(found.features[0].trendability, 2)
+    >>> [each.name for each in found.informative], round(found.features[0].trendability, 2)
     (['level'], 1.0)
     """
     rows = np.asarray(values, dtype=np.float64)
