@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.deep_check_text import deep_check_text, number, usual_range
 from wearstate.sim.deep_check.check import deep_check
-from wearstate.sim.deep_check.pump import closing_speeds
+from wearstate.sim.deep_check.pump_figures import closing_speeds
 from wearstate.sim.deep_check.rows import Figure, Quantity
 from wearstate.sim.journal.recording import film_geometry
 from wearstate.sim.scene.load import load_scene, scene_names

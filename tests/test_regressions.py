@@ -44,7 +44,7 @@ def test_flattened_trees_say_what_the_library_says(task, more, of_trees, of_boos
     )
     for name, model in (("trees", trees), ("boosting", boosting)):
         theirs = np.exp(model.fit(single[:200], np.log(target[:200])).predict(single))
-        ours = ROWS[name].fit(rows[:200], rows[:200], target[:200], 3).predict(rows)
+        ours = ROWS[name].fit(rows[:200], rows[:200], target[:200], 3, 0).predict(rows)
         # sums of 100 to 200 leaves in another order
         np.testing.assert_allclose(ours, theirs, rtol=1e-12)
         assert np.std(ours) > 0.1
@@ -53,7 +53,7 @@ def test_flattened_trees_say_what_the_library_says(task, more, of_trees, of_boos
 @pytest.mark.parametrize("name", ROWS)
 def test_one_row_is_told_as_among_many(task, name):
     rows, target, _ = task
-    part = ROWS[name].fit(rows, rows, target, 0)
+    part = ROWS[name].fit(rows, rows, target, 0, 0)
     # matrix and row products may add up in another order
     assert part.predict(rows[7:8])[0] == pytest.approx(part.predict(rows)[7], rel=1e-12)
 
@@ -104,7 +104,7 @@ def test_the_front_has_no_option_that_is_dearer_and_no_better(task):
 
 
 def constant(value, cost):
-    def fit(_rows, _moved, target, _seed):
+    def fit(_rows, _moved, target, _seed, _noted):
         zero = np.zeros(_rows.shape[1])
         ends = {"low": zero - 9, "high": zero + 9}
         return Linear(centre=zero, spread=zero + 1, weight=zero, **ends, offset=value, log=False)
@@ -227,7 +227,7 @@ def test_nets_follow_a_bend_and_what_they_met_on_other_machines():
     train, test = slice(0, 700), slice(700, 900)
 
     def errors(taught):
-        part = ROWS["nets"].fit(rows[train], taught[train], target[train], 0)
+        part = ROWS["nets"].fit(rows[train], taught[train], target[train], 0, 0)
         return [np.abs(np.log(part.predict(each[test]) / target[test])).mean() for each in seen]
 
     seen = rows, moved
@@ -235,6 +235,26 @@ def test_nets_follow_a_bend_and_what_they_met_on_other_machines():
     assert alone[0] < 0.1
     assert both[0] < 0.15
     assert both[1] < 0.25 * alone[1]
+
+
+def test_a_net_sees_a_noted_condition_beside_hundreds_of_features():
+    """The target hangs on one column that no principal direction holds; what is noted of the
+    machines with other resonances is another value, and teaches nothing."""
+    rng = np.random.default_rng(5)
+    sources = rng.standard_normal((900, 10))
+    features = sources @ rng.standard_normal((10, 400)) + 0.3 * rng.standard_normal((900, 400))
+    condition = rng.standard_normal((900, 1))
+    target = np.exp(0.3 * sources[:, 0] + 0.3 * condition[:, 0])
+    rows = np.hstack([features, condition])
+    moved = np.hstack([features, rng.permutation(condition)])
+    train, test = slice(0, 700), slice(700, 900)
+
+    def error(noted):
+        part = ROWS["nets"].fit(rows[train], moved[train], target[train], 0, noted)
+        return np.abs(np.log(part.predict(rows[test]) / target[test])).mean()
+
+    assert error(1) < 0.05
+    assert error(0) > 0.15  # most of the 0.24 that the condition makes
 
 
 def test_few_records_train_no_net(task):
@@ -246,5 +266,5 @@ def test_few_records_train_no_net(task):
 @pytest.mark.parametrize(("n", "trees"), [(999, 200), (1000, 400)])
 def test_many_records_grow_more_and_smaller_trees(n, trees):
     rows = np.random.default_rng(9).standard_normal((n, 3))
-    part = ROWS["boosting"].fit(rows, rows, np.exp(rows[:, 0]), 0)
+    part = ROWS["boosting"].fit(rows, rows, np.exp(rows[:, 0]), 0, 0)
     assert len(part.root) == trees

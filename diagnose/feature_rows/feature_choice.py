@@ -301,7 +301,7 @@ def _line_error(rows: Float, target: Float, folds: Folds) -> float:
     errors = np.zeros(len(_LINES))
     for train, test in folds:
         for i, line in enumerate(_LINES):
-            found = line.fit(rows[train], rows[train], target[train], 0).predict(rows[test])
+            found = line.fit(rows[train], rows[train], target[train], 0, 0).predict(rows[test])
             errors[i] += np.abs(np.clip(found, 0.0, 2 * target.max()) - target[test]).sum()
     return float(errors.min() / len(target))
 

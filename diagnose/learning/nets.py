@@ -34,7 +34,8 @@ class Nets:
     centre, spread : numpy.ndarray [shape=(n_features,)]
         Features are taken as deviations, within +-4.
     direction : numpy.ndarray [shape=(n_features, n_directions)]
-        Principal directions, scaled so that the first has one deviation over the training records.
+        Principal directions of the features, scaled so that the first has one deviation over the
+        training records, then a direction for each noted condition.
     first, second, last : numpy.ndarray [shape=(n_nets, n_directions, n_1), (n_nets, n_1, n_2), \
 (n_nets, n_2)]
         Weights.
@@ -73,7 +74,7 @@ def deviations(rows: Float, centre: Float, spread: Float) -> Float:
     return np.clip((rows - centre) / spread, -_FARTHEST, _FARTHEST)
 
 
-def fit_nets(rows: Float, moved: Float, target: Float, seed: int) -> Nets:
+def fit_nets(rows: Float, moved: Float, target: Float, seed: int, noted: int) -> Nets:
     """Fit on records as they are and on the same records with their resonances elsewhere.
 
     Parameters
@@ -84,21 +85,22 @@ def fit_nets(rows: Float, moved: Float, target: Float, seed: int) -> Nets:
         > 0.
     seed : int
         Of the weights that a net starts from, and of the order of its records.
+    noted : int
+        Number of columns at the end that are noted conditions. Each is an input by itself: the
+        principal directions of a thousand features hold next to nothing of a single column.
 
     Returns
     -------
     Nets
     """
-    from sklearn.decomposition import PCA
     from sklearn.preprocessing import StandardScaler
 
     scaler = StandardScaler().fit(rows)
     here = deviations(rows, scaler.mean_, scaler.scale_)
-    count = min(_DIRECTIONS, here.shape[1], len(here) // 2)
-    found = PCA(count, svd_solver="covariance_eigh").fit(here)
-    # not whitened: what the directions of small variance hold is noise for the most part
-    direction = found.components_.T / np.sqrt(found.explained_variance_[0])
+    direction = _directions(here, noted)
     there = deviations(moved, scaler.mean_, scaler.scale_)
+    # a resonance elsewhere changes nothing of what was noted
+    there[:, there.shape[1] - noted :] = here[:, here.shape[1] - noted :]
     seen = np.vstack([here, there]) @ direction
     level = np.log(target)
     offset, scale = float(level.mean()), float(level.std()) or 1.0
@@ -121,6 +123,20 @@ def fit_nets(rows: Float, moved: Float, target: Float, seed: int) -> Nets:
         scale=scale,
         offset=offset,
     )
+
+
+def _directions(deviation: Float, noted: int) -> Float:
+    """Principal directions of the features, and the noted conditions as they are."""
+    from sklearn.decomposition import PCA
+
+    features = deviation.shape[1] - noted
+    count = min(_DIRECTIONS, features, len(deviation) // 2)
+    found = PCA(count, svd_solver="covariance_eigh").fit(deviation[:, :features])
+    direction = np.zeros((features + noted, count + noted))
+    # not whitened: what the directions of small variance hold is noise for the most part
+    direction[:features, :count] = found.components_.T / np.sqrt(found.explained_variance_[0])
+    direction[features:, count:] = np.eye(noted)
+    return direction
 
 
 def _net(seen: Float, taught: Float, seed: int) -> Any:

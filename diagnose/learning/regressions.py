@@ -35,11 +35,11 @@ _FAR = 2.0  # estimates end this factor beyond the trained severities
 
 # --- candidates
 
-Fit = Callable[[Float, Float, Float, int], Part]
+Fit = Callable[[Float, Float, Float, int, int], Part]
 
 
 def _ridge(penalty: float, *, log: bool) -> Fit:
-    def fit(rows: Float, _moved: Float, target: Float, _seed: int) -> Linear:
+    def fit(rows: Float, _moved: Float, target: Float, _seed: int, _noted: int) -> Linear:
         from sklearn.linear_model import Ridge
         from sklearn.preprocessing import StandardScaler
 
@@ -66,7 +66,7 @@ def _share(tried: int, rows: Float) -> float:
     return min(1.0, tried / int(rows.shape[1]))
 
 
-def _fit_trees(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
+def _fit_trees(rows: Float, _moved: Float, target: Float, seed: int, _noted: int) -> Part:
     """Extremely randomised trees."""
     from sklearn.ensemble import ExtraTreesRegressor
 
@@ -87,7 +87,7 @@ def _fit_trees(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
     return _forest(tables, offset=0.0, log=True)
 
 
-def _fit_boosting(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
+def _fit_boosting(rows: Float, _moved: Float, target: Float, seed: int, _noted: int) -> Part:
     """Boosted trees over histograms of the features."""
     from sklearn.ensemble import HistGradientBoostingRegressor
     from threadpoolctl import threadpool_limits
@@ -169,8 +169,8 @@ class RegressionCandidate:
     cost_ms : float
         Of one prediction [ms].
     fit : callable
-        ``fit(rows, moved, target, seed)`` gives the part; `moved` are the same records on other
-        machines, the target is > 0.
+        ``fit(rows, moved, target, seed, noted)`` gives the part; `moved` are the same records on
+        other machines, the target is > 0, the last `noted` columns are noted conditions.
     fewest : int
         Records that it needs.
     """
@@ -292,6 +292,7 @@ def fit_blend(
     candidates: Sequence[RegressionCandidate] = CANDIDATES,
     shifted: Float | None = None,
     learnt_from: Index | None = None,
+    noted: int = 0,
 ) -> Fitted[Blend]:
     """Fit every affordable candidate and keep the best of them, or a blend.
 
@@ -312,6 +313,8 @@ def fit_blend(
         The same records on other machines than those trained on; as they are unless given.
     learnt_from : numpy.ndarray, optional
         Records that parts, weights and choice may learn from; all others are estimated only.
+    noted : int
+        Number of columns at the end that are noted conditions, not features.
 
     Returns
     -------
@@ -357,10 +360,10 @@ def fit_blend(
         )
     bounds = (float(target[everyone].min()) / _FAR, float(target[everyone].max()) * _FAR)
     asked = (rows, rows if shifted is None else shifted)
-    both = [_out_of_fold(item, asked, target, folds, seed) for item in usable]
+    both = [_out_of_fold(item, asked, target, folds, seed, noted) for item in usable]
     tables = np.clip(np.stack(both, axis=2), *bounds)
     ways: dict[str, Any] = {"seed": seed, "limit": limit, "bounds": bounds, "everyone": everyone}
-    return _chosen(usable, tables, asked, target, folds, **ways)
+    return _chosen(usable, tables, asked, target, folds, noted=noted, **ways)
 
 
 def fit_line(
@@ -383,7 +386,7 @@ def fit_line(
     """
     lines = {each.name: each for each in CANDIDATES if each.name in WITNESSES}
     best = min((o for o in options if o.name in lines), key=lambda option: option.error)
-    part = lines[best.name].fit(rows, rows, target, seed)
+    part = lines[best.name].fit(rows, rows, target, seed, 0)
     assert isinstance(part, Linear)
     room = _ENDLESS * part.spread
     return replace(part, low=part.centre - room, high=part.centre + room)
@@ -395,11 +398,12 @@ def _out_of_fold(
     target: Float,
     folds: Folds,
     seed: int,
+    noted: int,
 ) -> Float:
     """Estimates of every record as it is and shifted [shape=(2, n)]."""
     estimate = np.empty((2, len(target)))
     for train, test in folds:
-        part = candidate.fit(asked[0][train], asked[1][train], target[train], seed)
+        part = candidate.fit(asked[0][train], asked[1][train], target[train], seed, noted)
         estimate[:, test] = [part.predict(each[test]) for each in asked]
     return estimate
 
@@ -415,6 +419,7 @@ def _chosen(
     limit: float,
     bounds: tuple[float, float],
     everyone: Index,
+    noted: int,
 ) -> Fitted[Blend]:
     table = tables[0]
     names = _option_members(usable)
@@ -434,7 +439,8 @@ def _chosen(
     kept = np.flatnonzero(weights).tolist()
     members = [usable[i] for i in kept]
     parts = tuple(
-        item.fit(asked[0][everyone], asked[1][everyone], target[everyone], seed) for item in members
+        item.fit(asked[0][everyone], asked[1][everyone], target[everyone], seed, noted)
+        for item in members
     )
     smooth = np.array([is_smooth(part) for part in parts], dtype=np.float64)
     held, trees = sides(tables[:, :, kept], weights[kept], smooth)

@@ -33,7 +33,7 @@ _LARGEST_ARRAYS = 2**28  # byte, of all arrays unpacked: 1,000 times those of 2,
 _BOUNDS = dict.fromkeys((_SEAL, _CARD, _STRUCTURE), _LARGEST_TABLE) | {_ARRAYS: _LARGEST_ARRAYS}
 _MOST_ARRAYS = 10_000
 _LONGEST_HEADER = 1024  # byte, of an array: numpy's own have 118
-_FEATURES = 2  # to be raised when a feature is computed in another way
+_FEATURES = 2  # to be raised when a feature is computed differently
 
 
 class ModelError(ValueError):
@@ -62,19 +62,17 @@ class Bundle:
 
 @cache
 def feature_version() -> str:
-    """What the standard features are, in a few digits: a model of others cannot be used.
+    """Short hash of the standard features: a model of others cannot be used.
 
     Returns
     -------
     str
-        Changes with names, units, needs and settings of the standard features, and where one of
-        them is computed in another way.
+        Changes with names, units, scopes and settings of the standard features, and with
+        ``_FEATURES``.
     """
-    rows = [
-        [row[key] for key in ("name", "unit", "needs", "scope")] for row in catalogue("standard")
-    ]
-    told = json.dumps([_FEATURES, rows, repr(STANDARD)])
-    return hashlib.sha256(told.encode()).hexdigest()[:12]
+    rows = [[row[key] for key in ("name", "unit", "scope")] for row in catalogue("standard")]
+    identity = json.dumps([_FEATURES, rows, repr(STANDARD)])
+    return hashlib.sha256(identity.encode()).hexdigest()[:12]
 
 
 # --- writing

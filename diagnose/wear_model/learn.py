@@ -179,6 +179,7 @@ def _severity(
     seed: int,
     budget_ms: float | None,
     candidates: Sequence[RegressionCandidate] = CANDIDATES,
+    noted: int = 0,
 ) -> SeverityFit:
     """One fit for all records, or one for each regime where that errs less."""
     limit = BUDGET_MS if budget_ms is None else budget_ms
@@ -193,6 +194,7 @@ def _severity(
             candidates=candidates,
             shifted=moved,
             learnt_from=records,
+            noted=noted,
         )
 
     one = fit(None, 1)
@@ -277,7 +279,8 @@ def _informed(
     moved = np.hstack([other.inputs, strayed(training.conditions, noted, seed, REACH)])
     kept = {*blind.blend.names, *WITNESSES}
     kinds = [each for each in CANDIDATES if each.name in kept]
-    fitted = _severity(training, inputs, moved, folds, heads, seed, None, kinds)
+    count = len(training.conditions)
+    fitted = _severity(training, inputs, moved, folds, heads, seed, None, kinds, count)
     errors = [np.abs(each.estimate - training.severity).mean() for each in (fitted, blind)]
     if errors[0] > (1 - _WORTH) * errors[1]:
         return None

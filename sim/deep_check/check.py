@@ -10,7 +10,8 @@ from ..scene.pump import PumpScene
 from ..scene.scene import Scene
 from ..scene.shaft import ShaftScene
 from .journal import JOURNAL_ROWS, journal_facts
-from .pump import PUMP_ROWS, pump_facts
+from .pump import PUMP_ROWS
+from .pump_figures import pump_facts
 from .rows import RECORDING, Figure, Quantity, figures, plain_facts
 from .shaft import SHAFT_ROWS, shaft_facts
 
