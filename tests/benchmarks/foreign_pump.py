@@ -439,14 +439,13 @@ def record(job: Job, *, duration: float = DURATION) -> tuple[np.ndarray, dict[st
 def manifest_values(run: Conditions, angle: np.ndarray, duration: float) -> dict[str, float]:
     """Wear and conditions as the manifest names them, of a record with this crank angle."""
     turned = (angle[-1] - angle[0]) / (2 * pi) / (duration * (1 - 1 / len(angle)))
-    return dict(
-        zip(COLUMNS, (run.diametral_clearance, run.speed_hz, turned, run.discharge), strict=True)
-    )
+    values = (run.diametral_clearance, run.speed_hz, turned, run.discharge, SUCTION)
+    return dict(zip(COLUMNS, values, strict=True))
 
 
 COLUMNS = (
     *("diametral_clearance_crankpin_m", "speed_hz", "mean_speed_hz"),
-    "discharge_pressure_pa",
+    *("discharge_pressure_pa", "suction_pressure_pa"),
 )
 
 HEAD = {
