@@ -12,14 +12,9 @@ Examples
 (0.61, 250)
 """
 
+from .sim.bearing.bearing_status import BearingError
 from .sim.bearing.coefficients import Flow, coefficients, flow, friction
-from .sim.bearing.equilibrium import (
-    BearingError,
-    Equilibrium,
-    at_eccentricity,
-    equilibrium,
-    sommerfeld_number,
-)
+from .sim.bearing.equilibrium import Equilibrium, at_eccentricity, equilibrium, sommerfeld_number
 from .sim.bearing.operate import JournalBearing, OperatingPoint, operate
 from .sim.bearing.short_bearing import (
     short_attitude,

@@ -31,7 +31,8 @@ from wearstate.diagnose.stability.orbit_maps import (
     whirls,
 )
 from wearstate.diagnose.stability.steppers import STEPPERS, bounce, decays, runge_kutta_limit
-from wearstate.sim.bearing.equilibrium import BearingStatus, equilibrium
+from wearstate.sim.bearing.bearing_status import BearingStatus
+from wearstate.sim.bearing.equilibrium import equilibrium
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
 from wearstate.sim.output.recording import DataError

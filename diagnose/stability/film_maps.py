@@ -7,7 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...sim.bearing.equilibrium import BearingStatus, equilibrium, sommerfeld_number
+from ...sim.bearing.bearing_status import BearingStatus
+from ...sim.bearing.equilibrium import equilibrium, sommerfeld_number
 from ...sim.film.over_relaxed import PAPER_RELAXATION
 from ...sim.film.rungs import FILM_RUNGS
 from ...sim.film.solve import (

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from ...sim.bearing.equilibrium import BearingError, equilibrium
+from ...sim.bearing.bearing_status import BearingError
+from ...sim.bearing.equilibrium import equilibrium
 from ...sim.bearing.whirl import whirl
 from ...sim.journal.load import load
 from ...sim.journal.orbit import OrbitRun, run_orbit

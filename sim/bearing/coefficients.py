@@ -24,14 +24,8 @@ from numpy.typing import NDArray
 from ..film.direct import direct_tilted_force
 from ..film.slopes import Coefficients, perturbation
 from ..film.solve import direct_film, film_gap
-from .equilibrium import (
-    DISPLACEMENT,
-    JOURNAL_MOTIONS,
-    Equilibrium,
-    angles_around,
-    displaced_film,
-    turn_by,
-)
+from .equilibrium import Equilibrium
+from .film_force import DISPLACEMENT, JOURNAL_MOTIONS, angles_around, displaced_film, turn_by
 
 Vector = NDArray[np.float64]
 _RATE = 1e-5  # of the surface speed's share of a gap

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..bearing.bearing_status import BearingError
 from ..bearing.coefficients import coefficients, flow, friction
-from ..bearing.equilibrium import BearingError, Equilibrium, equilibrium
+from ..bearing.equilibrium import Equilibrium, equilibrium
 from ..bearing.whirl import stability
 from ..film.solve import LEAST_CELLS
 from ..journal.recording import film_geometry, journal_scale

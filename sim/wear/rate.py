@@ -15,7 +15,8 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from ..bearing.equilibrium import BearingError, Equilibrium, equilibrium
+from ..bearing.bearing_status import BearingError
+from ..bearing.equilibrium import Equilibrium, equilibrium
 from ..brief import brief
 from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
