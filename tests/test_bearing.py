@@ -7,8 +7,10 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from wearstate.sim.bearing import bearing_status as bs
 from wearstate.sim.bearing import coefficients as co
 from wearstate.sim.bearing import equilibrium as eq
+from wearstate.sim.bearing import film_force as ff
 from wearstate.sim.bearing import operate as op
 from wearstate.sim.bearing import short_bearing as sb
 from wearstate.sim.bearing import whirl as wh
@@ -365,7 +367,7 @@ def test_small_displacement_converges_to_the_analytic_slope():
     found = eq.equilibrium(geometry, [1.0, 0.3])
     assert np.all(found.film.pressure[:, 1:-1] > 0)
     exact = co.coefficients(found).stiffness
-    displaced, motions = eq.displaced_film, eq.JOURNAL_MOTIONS[:2]
+    displaced, motions = ff.displaced_film, ff.JOURNAL_MOTIONS[:2]
     errors = [
         np.abs(displaced(geometry, found.state, "direct", motions, step) - exact).max()
         for step in (0.04, 0.02, 0.01)
@@ -423,7 +425,7 @@ def test_stiffness_of_a_centred_journal_is_half_the_damping():
 @pytest.mark.parametrize("lines", [1, 7, 24])
 def test_rotation_of_load_and_frame(lines):
     geometry = FilmGeometry(length_to_diameter=0.7, n_theta=48, n_z=9)
-    turn = eq.turn_by(2 * PI * lines / 48)
+    turn = ff.turn_by(2 * PI * lines / 48)
     found = eq.equilibrium(geometry, [0.8, 0.0])
     turned = eq.equilibrium(geometry, turn @ [0.8, 0.0])
     assert_allclose(turned.position, turn @ found.position, atol=1e-9)  # of the search
@@ -437,7 +439,7 @@ def test_rotation_of_load_and_frame(lines):
 def test_reynolds_condition_turns_by_any_angle(angle):
     """Its mesh lies along the line of centres."""
     geometry = raimondi(0.7, n_theta=48, n_z=9)
-    turn = eq.turn_by(angle)
+    turn = ff.turn_by(angle)
     found, turned = (eq.equilibrium(geometry, load) for load in ([0.8, 0.0], turn @ [0.8, 0.0]))
     assert_allclose(turned.position, turn @ found.position, atol=1e-9)
     assert_allclose(
@@ -447,7 +449,7 @@ def test_reynolds_condition_turns_by_any_angle(angle):
     )
     assert_allclose(co.flow(turned).side, co.flow(found).side, rtol=1e-9)
     # the force on the mesh, turned back, balances the load
-    assert_allclose(eq.turn_by(turned.mesh_angle) @ turned.film.force, -turned.load, atol=1e-9)
+    assert_allclose(ff.turn_by(turned.mesh_angle) @ turned.film.force, -turned.load, atol=1e-9)
 
 
 def test_short_limit():
@@ -468,7 +470,7 @@ def test_short_limit():
 def test_rung_short_is_the_closed_form():
     geometry = FilmGeometry(length_to_diameter=0.3)
     load = eq.sommerfeld_number(friswell(1500))
-    turn = eq.turn_by(0.7)
+    turn = ff.turn_by(0.7)
     found = eq.equilibrium(geometry, turn @ [load, 0.0], rung="short")
     e = sb.short_eccentricity(load / 0.3**2)
     assert_allclose(found.eccentricity_ratio, e, rtol=1e-8)  # of the residual
@@ -654,37 +656,37 @@ def test_worn_grooved_tilted_bores_at_random():
         tilt = tuple(rng.uniform(-0.5, 0.5, 2))
         found = eq.equilibrium(geometry, load, tilt=tilt, raise_on_failure=False)
         seen.add(found.status)
-        if found.status is eq.BearingStatus.OVERLOAD:
+        if found.status is bs.BearingStatus.OVERLOAD:
             assert found.film.min_thickness < 1e-3
             assert np.hypot(*found.film.force) < size
         else:
             assert_allclose(found.film.force, -load, atol=1e-8 * size)
-    balanced = {eq.BearingStatus.OK, eq.BearingStatus.COARSE}
-    assert seen == {*balanced, eq.BearingStatus.OVERLOAD}
+    balanced = {bs.BearingStatus.OK, bs.BearingStatus.COARSE}
+    assert seen == {*balanced, bs.BearingStatus.OVERLOAD}
 
 
 def test_load_no_film_can_carry():
     """A tilted journal touches with an end while the film elsewhere is thick."""
     geometry, tilt = FilmGeometry(length_to_diameter=0.5, n_theta=48, n_z=13), (0.8, 0.0)
-    with pytest.raises(eq.BearingError, match=r"load = \(30, 0\).*overload.*lower the load"):
+    with pytest.raises(bs.BearingError, match=r"load = \(30, 0\).*overload.*lower the load"):
         eq.equilibrium(geometry, [30.0, 0.0], tilt=tilt)
     found = eq.equilibrium(geometry, [30.0, 0.0], tilt=tilt, raise_on_failure=False)
-    assert found.status is eq.BearingStatus.OVERLOAD
+    assert found.status is bs.BearingStatus.OVERLOAD
     assert eq.equilibrium(geometry, [0.3, 0.0], tilt=tilt).status.ok
 
 
 def test_film_too_thin_for_the_mesh():
     coarse, fine = (FilmGeometry(length_to_diameter=1.0, n_theta=n, n_z=9) for n in (72, 288))
-    with pytest.raises(eq.BearingError, match=r"load = \(318\.31, 0\).*coarse.*raise n_theta"):
+    with pytest.raises(bs.BearingError, match=r"load = \(318\.31, 0\).*coarse.*raise n_theta"):
         at_sommerfeld(coarse, 1e-3)
     found = at_sommerfeld(coarse, 1e-3, raise_on_failure=False)
-    assert found.status is eq.BearingStatus.COARSE
+    assert found.status is bs.BearingStatus.COARSE
     assert at_sommerfeld(fine, 1e-3).status.ok
 
 
 def test_tilt_without_room():
     geometry = FilmGeometry(length_to_diameter=0.5, n_theta=48, n_z=13)
-    with pytest.raises(eq.BearingError, match=r"no_room.*lower the tilt below 2 C"):
+    with pytest.raises(bs.BearingError, match=r"no_room.*lower the tilt below 2 C"):
         eq.equilibrium(geometry, [1.0, 0.0], tilt=(1.5, 1.5))
 
 
@@ -696,7 +698,7 @@ def test_feed_pressure_that_outweighs_the_load():
         grooves=(Groove(angle=PI, width=0.5, pressure=20.0),),
     )
     found = eq.equilibrium(geometry, [-0.01, 0.0], tilt=(0.6, 0.0), raise_on_failure=False)
-    assert found.status is eq.BearingStatus.NO_CONVERGENCE
+    assert found.status is bs.BearingStatus.NO_CONVERGENCE
     assert found.residual > 1
     assert "feed pressure" in found.status.text
 
@@ -771,7 +773,7 @@ def test_operating_point_scales():
     point = op.operate(bearing, speed=speed, load=load, tilt_coefficients=True)
     unit = bearing.force_unit(speed)
     state, step = point.equilibrium.state, 1e-7  # m, of 60 um
-    direct = eq._RUNGS["direct"].field
+    direct = ff.RUNGS["direct"].field
     moved = dataclasses.replace(state, x=state.x + step / 60e-6)
     change = (direct(bearing.geometry, moved).force - point.equilibrium.film.force) * unit / step
     # one-sided: of first order, 0.2 % of the gap
