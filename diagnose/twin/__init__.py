@@ -1,4 +1,4 @@
-"""A twin of one machine: unknown numbers of its scene, estimated from healthy recordings.
+"""A twin of one machine: unknown parameters of its scene, estimated from healthy recordings.
 
 It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
 ``features.signal``, ``features.rotation``, ``features.catalogue``, ``datasets.file``,

@@ -1,4 +1,4 @@
-"""From healthy recordings of one machine to its scene with what is unknown of it estimated."""
+"""Estimate unknown parameters of a machine's scene from healthy recordings of it."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ from ...sim.output.recording import DataError, Recording
 from ...sim.parts.wording import si_unit
 from ...sim.scene.load import load_scene, override, scene_from_table
 from ..pages.si_text import si_text
-from .inversion import LEAST_TOLD, Inverted, inverted, moved, rounds_of, standard
+from .inversion import DETERMINED, Inverted, inverted, offset_progress, rounds_of, standard
 from .levels import layout_of, levels_of, speed_of
 from .misfit import LEAST_P, Misfit, misfit, refusal
 from .regimes import PER_MEMBER, oiled_members, oiled_unknowns, with_regime
@@ -32,22 +32,22 @@ from .unknowns import WEAR, TwinUnknowns, unknowns_of
 Float = NDArray[np.float64]
 
 MOST_RECORDINGS = 8
-"""Of one calibration: each is simulated for every member."""
+"""Largest number of recordings in a calibration: each is simulated for every member."""
 PRIOR = "bilge-pump-standard"
 """Recipe whose draws are the prior of a pump."""
-_FULL_SCENE = "begin with that of wearstate scene show bilge-pump, or give a recipe of your own"
+_FULL_SCENE = "start from that of wearstate scene show bilge-pump, or give a recipe of your own"
 DRAWS = 400
-"""Of prior and posterior, for the table."""
+"""Draws of prior and posterior for the table."""
 DIGITS = 4
 
 
 class MisfitError(ValueError):
-    """The recordings are not of a machine of this scene."""
+    """The recordings do not fit a machine of this scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibratedNumber:
-    """One number of the scene before and after.
+    """One number of the scene before and after calibration.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class CalibratedNumber:
     prior, posterior : tuple of float
         Mean and standard deviation.
     narrower : float
-        Standard deviation of the prior over that of the posterior, both in normal scores.
+        Standard deviation of the prior over that of the posterior, in normal scores.
     """
 
     path: str
@@ -68,22 +68,22 @@ class CalibratedNumber:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CalibratedScene:
-    """A calibrated scene, of :func:`wearstate.calibrate`.
+    """A calibrated scene, from :func:`wearstate.calibrate`.
 
     Attributes
     ----------
     unknowns : TwinUnknowns
-        What was estimated, and its prior.
+        Estimated parameters and their prior.
     found : Inverted
         Joint distribution of the normal scores.
     misfit : Misfit
-        How well the recordings fit machines of this scene.
+        Misfit between the recordings and machines of this scene.
     recordings : tuple of str
-        What was used.
+        Recordings used.
     recipe, base : str
-        Recipe and scene before calibration: names of built-in ones, or files.
+        Recipe and scene before calibration: built-in names or files.
     unknown : tuple of str
-        What was to be estimated; empty for all.
+        Names to be estimated; empty for all.
     """
 
     unknowns: TwinUnknowns
@@ -96,7 +96,7 @@ class CalibratedScene:
 
     @cached_property
     def numbers(self) -> tuple[CalibratedNumber, ...]:
-        """Numbers of the scene that the recordings tell something of, best told first."""
+        """Numbers of the scene that the recordings determine, the best determined first."""
         rng = np.random.default_rng(0)
         draws = [each.draw(DRAWS, rng) for each in (self.found.prior, self.found.posterior)]
         kind = type(self.unknowns.recipe.scene)
@@ -104,7 +104,7 @@ class CalibratedScene:
         rows = []
         for name in self.unknowns.named:
             ratio = sd[self.unknowns.names.index(name)]
-            if ratio < LEAST_TOLD:
+            if ratio < DETERMINED:
                 path = self.unknowns.path_of(name)
                 spread = [self.unknowns.numbers(name, draw) for draw in draws]
                 before, after = ((float(s.mean()), float(s.std())) for s in spread)
@@ -121,7 +121,7 @@ class CalibratedScene:
 
     @property
     def table(self) -> dict[str, Any]:
-        """Everything that it says, ready for JSON."""
+        """Results, ready for JSON."""
         return {
             "scene": self.unknowns.recipe.scene.name,
             "recipe": self.unknowns.recipe.name,
@@ -146,12 +146,12 @@ class CalibratedScene:
 
     @property
     def text(self) -> str:
-        """What ``wearstate calibrate`` prints."""
+        """Text printed by ``wearstate calibrate``."""
         return calibration_text(self)
 
     @property
     def scene_table(self) -> dict[str, Any]:
-        """Plain table of the scene: what was learnt at its mean, all else as it was."""
+        """Plain table of the scene: determined numbers at their mean, all others unchanged."""
         mean, learnt = self.found.posterior.mean[np.newaxis], self._learnt
         values = {
             self.unknowns.path_of(name): float(self.unknowns.numbers(name, mean)[0])
@@ -164,7 +164,7 @@ class CalibratedScene:
 
     @property
     def twin_table(self) -> dict[str, Any]:
-        """Plain table of the posterior, for recipes: of what was learnt alone."""
+        """Plain table of the posterior of the determined numbers, for recipes."""
         names = [name for name in self._learnt if name != WEAR]
         places = [self.unknowns.names.index(name) for name in names]
         posterior = self.found.posterior
@@ -186,11 +186,11 @@ class CalibratedScene:
 
     @property
     def _learnt(self) -> tuple[str, ...]:
-        told = self.found.posterior.sd < LEAST_TOLD * self.found.prior.sd
-        return tuple(n for n, each in zip(self.unknowns.names, told, strict=True) if each)
+        determined = self.found.posterior.sd < DETERMINED * self.found.prior.sd
+        return tuple(n for n, each in zip(self.unknowns.names, determined, strict=True) if each)
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Write the scene, and beside it the posterior, ``mine.twin.toml`` for ``mine.toml``.
+        """Write the scene and the posterior, ``mine.toml`` and ``mine.twin.toml``.
 
         Parameters
         ----------
@@ -202,22 +202,22 @@ class CalibratedScene:
         Raises
         ------
         DataError
-            A file exists, the folder does not, or nothing was learnt.
+            A file exists, the folder does not, or no number was determined.
         """
         file = Path(path).absolute()
-        beside = twin_path(file)
-        for each in (file, beside):
+        posterior = twin_path(file)
+        for each in (file, posterior):
             refuse_output(each, force)
         if not self.twin_table["names"]:
             raise DataError(
                 "the recordings determine none of the unknowns; give more or longer ones"
             )
-        from_there = {
-            key: _seen_from(file.parent, getattr(self, key)) for key in ("recipe", "base")
+        origins = {
+            key: _relative_name(file.parent, getattr(self, key)) for key in ("recipe", "base")
         }
         for each, table in (
             (file, self.scene_table),
-            (beside, {**self.twin_table, **from_there}),
+            (posterior, {**self.twin_table, **origins}),
         ):
             write_whole(each, toml_text(table).encode(), force=force)
 
@@ -242,26 +242,26 @@ def calibrate(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> CalibratedScene:
-    """Estimate the unknown numbers of a reciprocating pump from healthy recordings of it.
+    """Estimate unknown parameters of a reciprocating pump from healthy recordings of it.
 
     Parameters
     ----------
     scene : str or Path
-        A built-in scene or a TOML file: data sheet and drawings.
+        Built-in scene or TOML file, from data sheet and drawings.
     recordings : sequence of Recording, str or Path
-        Of this machine while its wear was within the limits as new, at one or several speeds, with
-        a tacho; a data set stands for all its records.
+        Recordings of this machine while its wear was within the limits as new, at one or several
+        speeds, with a tacho; a data set stands for all its records.
     recipe : str or Path
-        What is unknown, and how widely: its draws of machines, around the scene.
+        Its draws of machines, around the scene, define the unknowns and their prior.
     unknown : sequence of str
-        Paths of the recipe's draws, or its choices, with ``*`` for any; all by default. What is
-        left out is as in the scene.
+        Paths of the recipe's draws, or its choices, with ``*`` for any; by default all. Others stay
+        as in the scene.
     budget_s : float, optional
-        Time to spend on a usual core [s]. It decides how many machines are simulated, and so the
-        result, which is the same on any computer; 310 machines by default, and half of
-        the first 130 again with oil in the crank pin.
+        Computing time on a usual core [s]. It determines the number of simulated machines and thus
+        the result, which is the same on any computer; by default 310 machines, and half of the
+        first 130 again with oil in the crank pin.
     seed : int
-        Of draws and sensor noise, >= 0.
+        Seed of draws and sensor noise, >= 0.
     jobs : int
         Worker processes; the result does not depend on them.
     progress : callable, optional
@@ -270,25 +270,25 @@ def calibrate(
     Returns
     -------
     CalibratedScene
-        Its ``text`` is the table, ``save`` writes scene and posterior.
+        ``text`` is the table, ``save`` writes scene and posterior.
 
     Raises
     ------
     DataError
         A recording cannot be read, has no tacho, or has other channels than the scene.
     MisfitError
-        No machine of the scene sounds like the recordings.
+        The recordings do not fit any machine of the scene.
     RecipeError, SceneError
-        Scene or recipe are at fault.
+        Scene or recipe are invalid.
 
     Notes
     -----
     Regularised ensemble Kalman inversion: each round draws machines, simulates them under the
     conditions of the recordings, and regresses normal scores of the unknowns on levels of the
-    crank-angle map and the spectrum, on scanned mode frequencies and the places of knocks. The
-    errors on machines left out are the posterior. Laws of contact are carried along, not chosen.
-    Where the scene has a dry crank pin, some machines are simulated with oil as well: recordings
-    that sound like these are refused.
+    crank-angle map and the spectrum, on scanned mode frequencies and on crank angles of knocks. The
+    errors on left-out machines give the posterior. Contact laws are carried along, not chosen. If
+    the crank pin of the scene is dry, some machines are also simulated with oil, and recordings
+    that resemble these are refused.
 
     References
     ----------
@@ -307,23 +307,23 @@ def calibrate(
     (False, True)
     """
     _refuse_other_machines(scene)
-    heard, names = _read(recordings)
+    loaded, names = _read(recordings)
     chosen = _chosen(recipe, scene)
-    plan = _prior(chosen, scene, heard[0])
+    plan = _prior(chosen, scene, loaded[0])
     unknowns = unknowns_of(plan, _as_new(plan), unknown)
-    refuse_channels(plan, heard)
-    runs = [conditions_of(plan, each) for each in heard]
-    layout = layout_of(heard[0])
-    observed = np.array([levels_of(each) for each in heard])
+    refuse_channels(plan, loaded)
+    runs = [conditions_of(plan, each) for each in loaded]
+    layout = layout_of(loaded[0])
+    observed = np.array([levels_of(each) for each in loaded])
     rounds = rounds_of(budget_s, len(runs))
     wet = oiled_unknowns(unknowns)
     extra = round(PER_MEMBER * rounds[0]) if wet is not None else 0
     total = extra + sum(rounds)
     oiled = oiled_members(
-        wet, extra, runs, seed=seed, jobs=jobs, progress=moved(progress, 0, total)
+        wet, extra, runs, seed=seed, jobs=jobs, progress=offset_progress(progress, 0, total)
     )
 
-    def look(rows: Float) -> None:
+    def check(rows: Float) -> None:
         far = with_regime(misfit(layout, rows, observed), layout, rows, observed, oiled)
         _refuse_misfit(plan, names, far)
 
@@ -336,8 +336,8 @@ def calibrate(
         rounds=rounds,
         seed=seed,
         jobs=jobs,
-        progress=moved(progress, extra, total),
-        look=look,
+        progress=offset_progress(progress, extra, total),
+        check=check,
     )
     return CalibratedScene(
         unknowns=unknowns,
@@ -353,28 +353,28 @@ def calibrate(
 def _read(
     recordings: Sequence[Recording | str | Path],
 ) -> tuple[list[Recording], tuple[str, ...]]:
-    """Recordings and what to call them."""
-    heard: list[Recording] = []
+    """Recordings and their names."""
+    loaded: list[Recording] = []
     for each in recordings:
         if isinstance(each, Recording):
-            heard.append(each)
+            loaded.append(each)
         elif Path(each).suffix.lower() in (".h5", ".hdf5") and Path(each).is_file():
-            heard += _of_data_set(Path(each))
+            loaded += _of_data_set(Path(each))
         else:
-            heard.append(_of_file(Path(each)))
-    if not 1 <= len(heard) <= MOST_RECORDINGS:
+            loaded.append(_of_file(Path(each)))
+    if not 1 <= len(loaded) <= MOST_RECORDINGS:
         raise DataError(
-            f"recordings = {len(heard)} must be >= 1 and <= {MOST_RECORDINGS}; choose some"
+            f"recordings = {len(loaded)} must be >= 1 and <= {MOST_RECORDINGS}; choose some"
         )
-    names = tuple(each.source or "recording" for each in heard)
-    for (one, a), (other, b) in combinations(zip(names, heard, strict=True), 2):
+    names = tuple(each.source or "recording" for each in loaded)
+    for (one, a), (other, b) in combinations(zip(names, loaded, strict=True), 2):
         if a.sample_rate == b.sample_rate and np.array_equal(a.signal, b.signal):
             raise DataError(f"{one} and {other} are the same recording; give each once")
-    return heard, names
+    return loaded, names
 
 
 def _of_file(path: Path) -> Recording:
-    """A measured file that says by itself what it holds."""
+    """Recording in a measured file that describes its own content."""
     try:
         return read_recording(path)
     except DataError as error:
@@ -396,20 +396,20 @@ def _of_data_set(path: Path) -> list[Recording]:
         return [replace(data[i], source=f"{path.name}:{i}") for i in range(len(data))]
 
 
-def _seen_from(folder: Path, name: str) -> str:
-    """A built-in name as it is, a file by its path from a folder, so that both can be moved."""
+def _relative_name(folder: Path, name: str) -> str:
+    """A built-in name, or the path of a file relative to a folder, so that both can be moved."""
     path = Path(name)
     return os.path.relpath(path.absolute(), folder) if path.is_file() else name
 
 
 def _chosen(recipe: str | Path, scene: str | Path) -> str | Path:
-    """The scene's own standard recipe unless another was named."""
+    """The standard recipe of the scene, unless another was given."""
     own = f"{scene}-standard"
     return own if recipe == PRIOR and own in recipe_names() else recipe
 
 
 def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
-    """The recipe around the scene, sampled as the recordings are."""
+    """The recipe around the scene, at the sample rate of the recordings."""
     try:
         return load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
     except RecipeError as error:
@@ -430,45 +430,46 @@ def _refuse_other_machines(scene: str | Path) -> None:
 
 
 def _as_new(plan: Recipe) -> tuple[float, float]:
-    """Wear of a sound machine [m]: between the first limit and where grade 1 begins."""
+    """Range of the wear of a healthy machine [m], up to the first grade edge."""
     edges = plan.severities[0].edges
     low = plan.severity.extremes()[0]
     if not edges or edges[0] <= low:
         raise DataError(
-            f"wear limits of {plan.scene.name} must be there, and as new < the first grade edge; "
+            f"wear limits of {plan.scene.name} must be given, with as new < the first grade edge; "
             "add the table [wear]"
         )
     return low, edges[0]
 
 
-def refuse_channels(plan: Recipe, heard: Sequence[Recording]) -> None:
-    """Raise DataError where recordings have other channels than the scene, or other rates."""
+def refuse_channels(plan: Recipe, loaded: Sequence[Recording]) -> None:
+    """Raise DataError if recordings differ from the scene in channels, or in sample rate."""
     wanted = tuple(sensor.name for sensor in getattr(plan.scene, "sensors", ()))
     faults = [
         f"{each.source or 'recording'}: channels {', '.join(each.vibration_names)} must be "
         f"{', '.join(wanted)}, as in the scene; rename channels, or sensors of the scene"
-        for each in heard
+        for each in loaded
         if each.vibration_names != wanted
     ]
     faults += [
         f"{each.source or 'recording'}: sample rate = {each.sample_rate:g} Hz must be "
-        f"{heard[0].sample_rate:g}, that of the first; give recordings of one rate"
-        for each in heard
-        if each.sample_rate != heard[0].sample_rate
+        f"{loaded[0].sample_rate:g}, that of the first; give recordings of one rate"
+        for each in loaded
+        if each.sample_rate != loaded[0].sample_rate
     ]
     if faults:
         raise DataError("\n".join(faults))
 
 
-def conditions_of(plan: Recipe, heard: Recording) -> dict[str, float]:
-    """Conditions of a recording by dotted path: its tacho's speed, and what its row tells."""
-    told = {
-        path: float(heard.row[column])
+def conditions_of(plan: Recipe, recording: Recording) -> dict[str, float]:
+    """Conditions of a recording by dotted path, from its tacho and its manifest row."""
+    row = recording.row
+    noted = {
+        path: float(row[column])
         for column, path in plan.conditions.items()
-        if column in heard.row and np.isfinite(heard.row[column]) and "start_angle" not in column
+        if column in row and np.isfinite(row[column]) and "start_angle" not in column
     }
-    speed = speed_of(heard)
-    return {**told, **motor_speed(plan.scene, speed), "drive.speed": speed}
+    speed = speed_of(recording)
+    return {**noted, **motor_speed(plan.scene, speed), "drive.speed": speed}
 
 
 def _refuse_misfit(plan: Recipe, names: Sequence[str], found: Misfit) -> None:
@@ -480,7 +481,7 @@ _WIDTH = 52  # characters of a path
 
 
 def calibration_text(found: "CalibratedScene") -> str:
-    """The table of a calibration, for people."""
+    """The table of a calibration as text."""
     learnt, plan = found.numbers, found.unknowns.recipe
     head = (
         f"{plan.scene.name}, calibrated on {len(found.recordings)} recording(s) with "
@@ -497,7 +498,7 @@ def calibration_text(found: "CalibratedScene") -> str:
 
 
 def _fit_line(misfit: Misfit) -> str:
-    """How well the recordings fit; where they fit least, unless noise alone would be told."""
+    """Line on the fit of the recordings, and on the largest misfit unless it only shows noise."""
     if misfit.refused:
         return f"largest misfit: {misfit.text}"
     fits = f"fits machines of this scene: p = {misfit.p:.2g}, refused below {LEAST_P:g}"
@@ -505,5 +506,5 @@ def _fit_line(misfit: Misfit) -> str:
 
 
 def _spread(value: tuple[float, float], unit: str) -> str:
-    """Mean and deviation."""
+    """Mean and standard deviation with unit."""
     return f"{si_text(value[0], unit)} ± {si_text(value[1], unit, 2)}"

@@ -20,24 +20,24 @@ from .unknowns import TwinUnknowns
 Float = NDArray[np.float64]
 
 REVOLUTIONS = 4.3
-"""Length of a simulated member [rev]. Levels of twenty revolutions differ from those of four by
-the scatter of the noise alone, as the mechanism repeats itself."""
+"""Length of a simulated member [rev]. Levels of twenty revolutions differ from those of four only
+by the scatter of the noise, because the mechanism repeats itself."""
 SETTLING = 1
-"""Revolutions before: the contact forgets its start within one."""
+"""Settling revolutions: the contact forgets its initial state within one."""
 
 _TOGETHER = 48  # members that a worker simulates side by side
 
 
 @dataclass(frozen=True)
 class Member:
-    """One machine to simulate.
+    """One machine to be simulated.
 
     Attributes
     ----------
     scores : ndarray [shape=(n_names,)]
         Normal scores of the unknowns.
     seed : int
-        Of the sensor noise.
+        Seed of the sensor noise.
     """
 
     scores: Float
@@ -53,16 +53,16 @@ def simulated(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Float, Float]:
-    """Levels of every member under every run; members that do not run are left out.
+    """Levels of every member in every run; members that fail are left out.
 
     Parameters
     ----------
     unknowns : TwinUnknowns
     scores : ndarray [shape=(n_members, n_names)]
     runs : sequence of mapping
-        Dotted path -> condition [SI], ``drive.speed`` among them.
+        Dotted path -> condition [SI], including ``drive.speed``.
     seed : int
-        Of the sensor noise; member `i` takes ``seed + i``.
+        Seed of the sensor noise; member `i` uses ``seed + i``.
     jobs : int
         Worker processes; the result is the same for any number.
     progress : callable, optional
@@ -72,7 +72,7 @@ def simulated(
     -------
     scores : ndarray [shape=(n_kept, n_names)]
     levels : ndarray [shape=(n_kept, n_runs, n_levels)]
-        In decibels.
+        Levels [dB].
     """
     members = [Member(row, seed + i) for i, row in enumerate(scores)]
     work = partial(_levels, unknowns, runs)
@@ -89,14 +89,14 @@ def simulated(
 def _levels(
     unknowns: TwinUnknowns, runs: Sequence[Mapping[str, float]], members: Sequence[Member]
 ) -> list[Float | None]:
-    """Levels of each member [shape=(n_runs, n_levels)], None where it does not run."""
+    """Levels of each member [shape=(n_runs, n_levels)], None if it fails."""
     jobs: list[tuple[Scene, int]] = []
     owners: list[tuple[int, int]] = []
     levels: list[list[Float | None]] = [[None] * len(runs) for _ in members]
     for i, member in enumerate(members):
         for j, run in enumerate(runs):
             short = {"duration": REVOLUTIONS / run["drive.speed"], "settling_revolutions": SETTLING}
-            with suppress(SceneError):  # numbers that no scene takes
+            with suppress(SceneError):  # numbers that the scene rejects
                 jobs.append((unknowns.scene(member.scores, {**run, **short}), member.seed))
                 owners.append((i, j))
     for number, found in simulate_many(jobs):

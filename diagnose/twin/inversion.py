@@ -15,21 +15,21 @@ from .unknowns import TwinUnknowns
 Float = NDArray[np.float64]
 
 ROUNDS = (130, 90, 90)
-"""Members of the rounds: the first draws from the prior, each further one around the last."""
+"""Members of the rounds: the first draws from the prior, later ones around the previous result."""
 WIDENED = (3.0, 1.6)
-"""How much wider than what is known the next ensemble is drawn, after the first round and later:
-the first knows the scatter of all machines of the recipe, and not of this one."""
-UNTOLD = 0.75
-"""Deviation, in those of the prior, above which an unknown is drawn from the prior again."""
-LEAST_TOLD = 0.9
-"""Deviation, in those of the prior, below which an unknown counts as told."""
+"""Widening of the posterior for the next ensemble, after the first round and later: the first knows
+the scatter of all machines of the recipe, not of this one."""
+UNDETERMINED = 0.75
+"""Standard deviation over that of the prior, above which an unknown is drawn from the prior."""
+DETERMINED = 0.9
+"""Standard deviation over that of the prior, below which an unknown counts as determined."""
 COST_S = 0.1
-"""Of one simulated recording on a usual core, and its share of machines with oil [s], to turn a
-budget into members."""
+"""Time of one simulated recording on a usual core, with its share of machines with oil [s], to
+convert a budget into members."""
 FEWEST = 120
-"""Members: fewer tell nothing of a hundred unknowns."""
+"""Fewest members: fewer give no information on a hundred unknowns."""
 STEP_LIMIT = 2.5
-"""Farthest step of a round, in deviations of its ensemble."""
+"""Longest step of a round, in standard deviations of its ensemble."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class Gaussian:
 
     @property
     def sd(self) -> Float:
-        """[shape=(n_names,)]."""
+        """Standard deviations [shape=(n_names,)]."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def draw(self, count: int, rng: np.random.Generator) -> Float:
@@ -59,7 +59,7 @@ class Gaussian:
 
 @dataclass(frozen=True, kw_only=True)
 class Inverted:
-    """What recordings say of the unknowns.
+    """Distribution of the unknowns, given recordings.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Inverted:
     scores, levels : ndarray
         Members of the last round and their levels [dB].
     members : int
-        Simulated in all.
+        Total number of simulated members.
     """
 
     posterior: Gaussian
@@ -79,12 +79,12 @@ class Inverted:
 
 
 def standard(count: int) -> Gaussian:
-    """The prior: what the recipe draws, each number apart."""
+    """Prior of independent normal scores."""
     return Gaussian(mean=np.zeros(count), covariance=np.eye(count))
 
 
 def rounds_of(budget_s: float | None, n_runs: int) -> tuple[int, ...]:
-    """Members of each round that a budget allows; the usual ones without.
+    """Members of each round within a budget; without one the usual numbers.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def inverted(
     seed: int = 0,
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
-    look: Callable[[Float], None] | None = None,
+    check: Callable[[Float], None] | None = None,
 ) -> Inverted:
     """Invert levels for the unknowns.
 
@@ -117,24 +117,24 @@ def inverted(
     ----------
     unknowns : TwinUnknowns
     layout : LevelLayout
-        Of the levels.
+        Layout of the levels.
     observed : ndarray [shape=(n_runs, n_levels)]
-        Of the recordings [dB].
+        Levels of the recordings [dB].
     runs : sequence of mapping
         Conditions of each recording.
     prior : Gaussian
-        Of the normal scores.
+        Prior of the normal scores.
     rounds : sequence of int
         Members of each round.
     wider : sequence of float
-        How much wider than what is known an ensemble is drawn, after the first round and later.
+        Widening of the posterior for the next ensemble, after the first round and later.
     seed : int
-        Of draws and sensor noise.
+        Seed of draws and sensor noise.
     jobs : int
         Worker processes.
     progress : callable, optional
         Called with (members done, members).
-    look : callable, optional
+    check : callable, optional
         Called with the levels of the first ensemble; may raise to stop.
     """
     rng = np.random.default_rng(seed)
@@ -146,11 +146,11 @@ def inverted(
             runs,
             seed=seed + 100_000 * (number + 1),
             jobs=jobs,
-            progress=moved(progress, done, sum(rounds)),
+            progress=offset_progress(progress, done, sum(rounds)),
         )
         done += count
-        if look is not None and number == 0:  # further ones hold fewer machines of the scene
-            look(members[1])
+        if check is not None and number == 0:  # later ones no longer represent the scene
+            check(members[1])
         used = members if number < 2 or before is None else _joined(before, members)
         posterior = _step(unknowns, layout, used, observed, prior if number == 0 else None, prior)
         proposal = widened(posterior, prior, wider[min(number, 1)])
@@ -172,7 +172,7 @@ def _step(
     drawn: Gaussian | None,
     prior: Gaussian,
 ) -> Gaussian:
-    """Posterior of an ensemble, which was drawn from a known Gaussian or is one by its moments."""
+    """Posterior of an ensemble, drawn from a known Gaussian or described by its moments."""
     scores, levels = members
     rows = np.concatenate([levels, observed[np.newaxis]])
     scans, knocks = _scans(unknowns, layout, scores, rows), _knocks(layout, rows)
@@ -184,20 +184,20 @@ def _step(
 
 
 def _knocks(layout: LevelLayout, rows: Float) -> Float:
-    """Places of knocks of all runs, in their scatter [shape=(n + 1, n_runs * n_knocks)]."""
+    """Crank angles of knocks in all runs, scaled by scatter [shape=(n + 1, n_runs * n_knocks)]."""
     found = layout.knocks_of(rows).reshape(len(rows), -1)
     scatter = np.sqrt(found[:-1].var(axis=0) + LEAST_ANGLE**2)
     return np.asarray((found - found[:-1].mean(axis=0)) / scatter)
 
 
 LEAST_ANGLE = 0.5
-"""Scatter of the place of a knock that is always there [deg]."""
+"""Smallest scatter of the crank angle of a knock [deg]."""
 
 
-def moved(
+def offset_progress(
     progress: Callable[[int, int], None] | None, before: int, total: int
 ) -> Callable[[int, int], None] | None:
-    """Progress of a part that begins after others."""
+    """Progress of a part that starts after others."""
     return None if progress is None else lambda done, _: progress(before + done, total)
 
 
@@ -215,16 +215,16 @@ def _scans(unknowns: TwinUnknowns, layout: LevelLayout, scores: Float, levels: F
 
 
 def corrected(found: Regressed, proposal: Gaussian, prior: Gaussian) -> Gaussian:
-    """Posterior under the prior, of one found under the proposal.
+    """Convert a posterior found under the proposal into one under the prior.
 
-    What the recordings say of each unknown is what the regression found less what the ensemble was
-    drawn with; the prior is added once, however many rounds there are.
+    The information of the recordings is that of the regression minus that of the proposal; the
+    prior is added once, regardless of the number of rounds.
     """
     sd = np.minimum(found.sd, proposal.sd)
     limit = STEP_LIMIT * proposal.sd
     mean = proposal.mean + np.clip(found.mean - proposal.mean, -limit, limit)
-    told = sd**-2.0 - proposal.sd**-2.0
-    precision = told + prior.sd**-2.0
+    gained = sd**-2.0 - proposal.sd**-2.0
+    precision = gained + prior.sd**-2.0
     weighted = mean / sd**2 - proposal.mean / proposal.sd**2 + prior.mean / prior.sd**2
     final = precision**-0.5
     turned = _correlation(found.residuals)
@@ -232,7 +232,7 @@ def corrected(found: Regressed, proposal: Gaussian, prior: Gaussian) -> Gaussian
 
 
 def _correlation(residuals: Float) -> Float:
-    """Correlation of residuals, shrunk as far as so few members do not tell it."""
+    """Correlation of residuals, shrunk according to the number of members."""
     count = len(residuals)
     scale = np.sqrt((residuals**2).mean(axis=0))
     found = (residuals / scale).T @ (residuals / scale) / count
@@ -245,10 +245,10 @@ def _correlation(residuals: Float) -> Float:
 
 
 def widened(posterior: Gaussian, prior: Gaussian, factor: float) -> Gaussian:
-    """Where the next ensemble is drawn: wider, and no farther than the prior."""
-    told = posterior.sd < UNTOLD * prior.sd
-    sd = np.where(told, np.minimum(factor * posterior.sd, prior.sd), prior.sd)
-    mean = np.where(told, posterior.mean, prior.mean)
+    """Distribution of the next ensemble: wider than the posterior, at most as wide as the prior."""
+    known = posterior.sd < UNDETERMINED * prior.sd
+    sd = np.where(known, np.minimum(factor * posterior.sd, prior.sd), prior.sd)
+    mean = np.where(known, posterior.mean, prior.mean)
     correlation = posterior.covariance / np.outer(posterior.sd, posterior.sd)
-    both = np.outer(told, told) | np.eye(len(sd), dtype=bool)
+    both = np.outer(known, known) | np.eye(len(sd), dtype=bool)
     return Gaussian(mean=mean, covariance=np.where(both, correlation, 0.0) * np.outer(sd, sd))

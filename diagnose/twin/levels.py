@@ -1,4 +1,4 @@
-"""What a calibration compares: levels of crank-angle map and spectrum, and where it knocks."""
+"""Quantities that a calibration compares: crank-angle map, spectrum, crank angles of knocks."""
 
 from dataclasses import dataclass
 
@@ -13,33 +13,33 @@ from ...sim.output.recording import DataError, Recording
 Float = NDArray[np.float64]
 
 SETTINGS = Settings()
-"""Angle bins and bands of the map: those of the standard features."""
+"""Angle bins and bands of the map, as for the standard features."""
 LINE_STEP = 0.012
-"""Ratio between two points of the spectrum, less one: a mode of one per cent damping is two of them
+"""Ratio of adjacent points of the spectrum, minus one: a mode of one per cent damping is two points
 wide."""
 LEAST_RATE = 5000.0
-"""Of a recording [Hz]: slower ones have fewer lines than the map has bands."""
+"""Lowest sample rate [Hz]: slower recordings have fewer lines than the map has bands."""
 LOWEST, HIGHEST = 90.0, 9500.0
-"""Ends of the spectrum [Hz]: below, orders of the crank alone; above, the converter's filter."""
+"""Ends of the spectrum [Hz]: only crank orders below, the converter's filter above."""
 LINES = 8192
-"""Samples of a window of the spectrum."""
+"""Window length of the spectrum [samples]."""
 
 KNOCK_EDGES = (200.0, 1000.0, 3000.0, 9500.0)
-"""Of the bands in which knocks are placed [Hz], as far as the sample rate reaches."""
+"""Edges of the bands in which knocks are located [Hz], as far as the sample rate allows."""
 KNOCK_TOP = 0.4
-"""Of the sample rate: the bands of knocks end there, below the converter's filter."""
+"""Upper end of the knock bands over the sample rate, below the converter's filter."""
 KNOCK_BINS, KNOCK_WINDOW = 120, 128
-"""Angle bins in a revolution, and samples of the window: 3 degrees, and 2 ms at half its height."""
+"""Angle bins per revolution, and window length [samples]: 3 degrees, and 2 ms at half height."""
 DEAD_CENTRES = (0, 180)
 BEFORE, AFTER = 20, 70
-"""Degrees around a dead centre in which the pressure turns and the pin changes sides."""
+"""Range around a dead centre in which the pressure reverses and the pin changes sides [deg]."""
 SHARES = (0.15, 0.5, 0.85)
-"""Of the energy there: the crank angles by which they have come."""
+"""Cumulative shares of the energy there, whose crank angles are used."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LevelLayout:
-    """Where the levels of one recording are in their row.
+    """Layout of the levels of one recording in a row.
 
     Attributes
     ----------
@@ -53,12 +53,12 @@ class LevelLayout:
 
     @property
     def edges(self) -> Float:
-        """Of the bands of the map [Hz]."""
+        """Edges of the bands of the map [Hz]."""
         return SETTINGS.map_edges(self.sample_rate)
 
     @property
     def knock_edges(self) -> tuple[float, ...]:
-        """Of the bands in which knocks are placed [Hz]."""
+        """Edges of the bands in which knocks are located [Hz]."""
         top = min(KNOCK_EDGES[-1], KNOCK_TOP * self.sample_rate)
         return (*(edge for edge in KNOCK_EDGES[:-1] if 1.5 * edge <= top), top)
 
@@ -86,29 +86,29 @@ class LevelLayout:
         return rows[..., : -self.n_knocks]
 
     def knocks_of(self, rows: Float) -> Float:
-        """Where it knocks [deg, shape=(..., n_knocks)]."""
+        """Crank angles of knocks [deg, shape=(..., n_knocks)]."""
         return rows[..., -self.n_knocks :]
 
     @property
     def n_knocks(self) -> int:
-        """Crank angles of each row."""
+        """Number of crank angles in each row."""
         bands = len(self.knock_edges) - 1
         return len(self.channels) * bands * len(DEAD_CENTRES) * len(SHARES)
 
 
 def layout_of(recording: Recording) -> LevelLayout:
-    """LevelLayout of a recording's levels."""
+    """Layout of a recording's levels."""
     return LevelLayout(channels=recording.vibration_names, sample_rate=recording.sample_rate)
 
 
 def levels_of(recording: Recording) -> Float:
-    """Map and spectrum [dB] and places of knocks [deg] of a recording in a row [shape=(n,)].
+    """Map and spectrum [dB] and crank angles of knocks [deg] of a recording [shape=(n,)].
 
     Raises
     ------
     DataError
-        It has no tacho of one pulse per revolution, is shorter than two revolutions, or is sampled
-        more slowly than `LEAST_RATE`.
+        The recording has no tacho with one pulse per revolution, is shorter than two revolutions,
+        or has a sample rate below `LEAST_RATE`.
     """
     pulses = pulses_of(recording)
     signals, fs = recording.vibration, recording.sample_rate
@@ -128,9 +128,9 @@ def levels_of(recording: Recording) -> Float:
 
 
 def _knocks(energy: Float) -> Float:
-    """Crank angles by which shares of the energy around each dead centre have come [deg].
+    """Crank angles at which shares of the energy around each dead centre are reached [deg].
 
-    From energy over the angle [shape=(n_channels, KNOCK_BINS, n_bands)] to
+    Input: energy over the angle [shape=(n_channels, KNOCK_BINS, n_bands)]; output
     [shape=(n_centres, n_channels, n_bands, n_shares)].
     """
     width = 360 // KNOCK_BINS
@@ -156,7 +156,7 @@ def pulses_of(recording: Recording) -> Float:
     tacho = recording.tacho_signal
     who = recording.source or "recording"
     if tacho is None or recording.pulses_per_revolution != 1:
-        raise DataError(f"{who}: tacho must be there, with one pulse per revolution; record one")
+        raise DataError(f"{who}: a tacho with one pulse per revolution is missing; record one")
     pulses = order.pulse_times(tacho, recording.sample_rate)
     if pulses.size < 3:
         raise DataError(f"{who}: {pulses.size} pulses must be >= 3; give a longer recording")

@@ -1,7 +1,7 @@
-"""Whether the recordings could be of any machine of the ensemble, and where they could not.
+"""Whether the recordings fit any machine of the ensemble, and where they do not.
 
-A level that no machine of the scene shows is no matter of its numbers: it is another machine, a
-wrong channel, a wrong geometry.
+A level that no machine of the scene shows is not a question of its parameters: it means another
+machine, a wrong channel or a wrong geometry.
 """
 
 import itertools
@@ -16,58 +16,58 @@ from .levels import LevelLayout
 Float = NDArray[np.float64]
 
 LEAST_SCATTER = 1.0
-"""Added to the scatter of a level [dB]: models of machines agree with machines no better."""
+"""Added to the scatter of a level [dB]: models agree with real machines no better."""
 MAP_NUGGET = 0.05
-"""Part of a level's variance that belongs to each recording alone."""
+"""Share of a level's variance that is specific to each recording."""
 SPECTRUM_NUGGET = 1.0
-"""The same of the spectrum: so large that a spectrum far out along what the members differ in, as
-that of noise or of a quiet machine, is far from them too."""
+"""The same for the spectrum: so large that a spectrum that is extreme along directions in which the
+members differ, such as that of noise or of a quiet machine, is also far from them."""
 VIEWS = 3
-"""Map, spectrum and change over a turn: the worst of three shares is as rare as thrice it says."""
+"""Map, spectrum and change over a revolution: Bonferroni factor of the smallest of three shares."""
 TAIL = 0.1
-"""Farthest members, whose mean excess continues the distribution of distances beyond them."""
+"""Share of farthest members, whose mean excess extrapolates the distribution of distances."""
 MAP_EXCESS, SPECTRUM_EXCESS = 0.9, 1.15
-"""That excess at the least, in distances from the median to the edge of the farthest members: a
-hundred members may lack the rare machines that are far out. Mean of 780 machines simulated apart
-from six ensembles."""
+"""Smallest mean excess, over the distance from the median to the edge of the farthest members: a
+hundred members may lack rare extreme machines. Mean of 780 machines simulated in addition to six
+ensembles."""
 LEAST_P = 0.02
-"""Of a machine of the scene, below which recordings are refused."""
+"""P-value of a machine of the scene, below which recordings are refused."""
 FAR_BETTER = 5.0
-"""Times as likely with the channels in another order, or of another kind: then they are."""
+"""Ratio of p-values above which another channel order, or another kind of machine, is assumed."""
 LEAST_REGIME_P = 0.01
-"""Of a machine of the scene, below which another lubrication is believed. Together with `LEAST_P`
-at most three of a hundred machines of the scene are refused."""
+"""P-value of a machine of the scene, below which another lubrication is assumed. Together with
+`LEAST_P` at most three of a hundred machines of the scene are refused."""
 OILED = "bilge-pump-oiled"
 """Recipe with the lubrications of a crank pin."""
 DOUBT = 0.2
-"""Of recordings that fit no worse than this the order of channels is not asked."""
+"""P-value above which the order of channels is not questioned."""
 SECTORS = 12
-"""Of the crank angle, for words."""
+"""Sectors of the crank angle in texts."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Misfit:
-    """How far recordings are from what machines of the scene can show.
+    """Distance between recordings and the machines of the scene.
 
     Attributes
     ----------
     p : float
         Share of the scene's machines that are as far from the others, by map or by spectrum, or
-        that change as little over a turn.
+        that change as little over a revolution.
     channel : str
-        Where it is worst.
+        Channel with the largest misfit.
     band_hz : tuple of float
     angle_deg : tuple of float
     level_db : float
-        There, above what the nearest machine shows; below it where negative.
+        Level there relative to the nearest machine.
     order : tuple of str
-        Channels in the order in which they would fit far better; empty where there is none.
+        Order of channels with a far better fit; empty if there is none.
     regime : str
-        Lubrication of the crank pin that they sound like; empty where it is that of the scene.
+        Lubrication of the crank pin that they resemble; empty if it is that of the scene.
     regime_p : float
-        Share of the scene's machines that sound as much like it.
+        Share of the scene's machines that resemble it as much.
     even : bool
-        It is by how little they change over a turn, as noise does, that they are worst.
+        The largest misfit is that they change too little over a revolution, like noise.
     """
 
     p: float
@@ -82,16 +82,16 @@ class Misfit:
 
     @property
     def refused(self) -> bool:
-        """Whether no calibration mends it."""
+        """Whether the recordings must be refused."""
         return self.p < LEAST_P or bool(self.order or self.regime)
 
     @property
     def text(self) -> str:
-        """Where it is worst, in words."""
+        """The largest misfit in words."""
         if self.even:
             return (
-                "levels change less over a turn of the crank than those of any machine of this "
-                f"scene, as noise does (p = {self.p:.2g})"
+                "levels change less over a crank revolution than those of any machine of this "
+                f"scene, like noise (p = {self.p:.2g})"
             )
         low, high = (f"{each / 1000:.2g}" for each in self.band_hz)
         side = "above" if self.level_db > 0 else "below"
@@ -103,20 +103,20 @@ class Misfit:
 
 
 def misfit(layout: LevelLayout, rows: Float, observed: Float) -> Misfit:
-    """Distance of recordings from an ensemble, against that of its own members.
+    """Distance of recordings from an ensemble, relative to that of its own members.
 
     Parameters
     ----------
     layout : LevelLayout
     rows : ndarray [shape=(n, n_runs, n_levels)]
-        Of the members.
+        Levels of the members.
     observed : ndarray [shape=(n_runs, n_levels)]
-        Of the recordings.
+        Levels of the recordings.
 
     Notes
     -----
-    Of map and spectrum each the predictive variance of a Gaussian process with a linear kernel,
-    left out one by one for the members.
+    The distance is the predictive variance of a Gaussian process with a linear kernel, separately
+    for map and spectrum; for the members it is computed by leaving each one out.
     """
     channels = layout.channels
     found = _judged(layout, rows, observed, range(len(channels)))
@@ -129,15 +129,15 @@ def misfit(layout: LevelLayout, rows: Float, observed: Float) -> Misfit:
 
 
 def far_better(other: Misfit, found: Misfit) -> bool:
-    """Whether recordings fit elsewhere, and far better than where they were looked for."""
+    """Whether recordings fit an alternative, and far better than the assumption."""
     return other.p > max(LEAST_P, FAR_BETTER * found.p)
 
 
-def tail_share(own: Float, here: float, least_excess: float = 0.0) -> float:
-    """Share of distances that are as large; beyond the largest ones by an exponential tail.
+def tail_share(own: Float, value: float, least_excess: float = 0.0) -> float:
+    """Share of distances that are as large as a value, with an exponential tail.
 
-    Its scale is the mean excess of the largest tenth, or `least_excess` times the distance from the
-    median to them where that is more.
+    The scale of the tail is the mean excess of the largest tenth, but at least `least_excess` times
+    the distance from the median to these.
 
     Examples
     --------
@@ -146,14 +146,14 @@ def tail_share(own: Float, here: float, least_excess: float = 0.0) -> float:
     (0.5, 0.002)
     """
     middle, edge = np.quantile(own, (0.5, 1 - TAIL))
-    if here <= edge:
-        return max(TAIL, float((own >= here).mean()))
+    if value <= edge:
+        return max(TAIL, float((own >= value).mean()))
     excess = max((own[own > edge] - edge).mean(), least_excess * (edge - middle))
-    return TAIL * float(np.exp(-(here - edge) / excess))
+    return TAIL * float(np.exp(-(value - edge) / excess))
 
 
 def _judged(layout: LevelLayout, rows: Float, observed: Float, order: Sequence[int]) -> Misfit:
-    """Misfit with the channels in an order, of the view that it is worse in."""
+    """Misfit with the channels in a given order, for the view with the smallest share."""
     places = list(order)
     map_p, map_left = _distance(
         layout.map_of(rows), layout.map_of(observed)[:, places], MAP_NUGGET, MAP_EXCESS
@@ -174,13 +174,15 @@ def _judged(layout: LevelLayout, rows: Float, observed: Float, order: Sequence[i
 
 
 def _swing(levels: Float) -> Float:
-    """How much levels change over a turn: noise that knows no crank changes least [log dB]."""
+    """Change of levels over a revolution [log dB]; smallest for noise unrelated to the crank."""
     return np.asarray(np.log(levels.std(axis=-2).mean(axis=(-3, -2, -1))))
 
 
-def _distance(members: Float, here: Float, part: float, least_excess: float) -> tuple[float, Float]:
-    """Share of members as far from the others, and what is left of the recordings [dB]."""
-    flat = np.concatenate([members, here[np.newaxis]]).reshape(len(members) + 1, -1)
+def _distance(
+    members: Float, observed: Float, part: float, least_excess: float
+) -> tuple[float, Float]:
+    """Share of members as far from the others, and residual of the recordings [dB]."""
+    flat = np.concatenate([members, observed[np.newaxis]]).reshape(len(members) + 1, -1)
     scatter = np.sqrt(flat[:-1].var(axis=0) + LEAST_SCATTER**2)
     scaled = (flat - flat[:-1].mean(axis=0)) / scatter
     products = scaled @ scaled[:-1].T / scaled.shape[1]
@@ -191,11 +193,11 @@ def _distance(members: Float, here: Float, part: float, least_excess: float) -> 
     own = np.log(1 / np.diag(inverse))
     distance = np.log((scaled[-1] ** 2).mean() + nugget - last @ weights)
     left = (scaled[-1] - weights @ scaled[:-1]) * scatter
-    return tail_share(own, float(distance), least_excess), left.reshape(here.shape)
+    return tail_share(own, float(distance), least_excess), left.reshape(observed.shape)
 
 
 def _worst(layout: LevelLayout, residual: Float, p: float) -> Misfit:
-    """Cell of channel, band and sector with the largest residual of all runs together [dB]."""
+    """Cell of channel, band and sector with the largest mean residual over the runs [dB]."""
     runs, channels, bins, bands = residual.shape
     cells = residual.reshape(runs, channels, SECTORS, bins // SECTORS, bands).mean(axis=(0, 3))
     channel, sector, band = np.unravel_index(np.argmax(np.abs(cells)), cells.shape)
@@ -211,7 +213,7 @@ def _worst(layout: LevelLayout, residual: Float, p: float) -> Misfit:
 
 
 def _line(layout: LevelLayout, residual: Float, p: float) -> Misfit:
-    """Channel and band of the map whose lines have the largest residual of all runs together."""
+    """Channel and band whose lines have the largest mean residual over the runs."""
     edges, points = layout.edges, layout.points
     bands = np.searchsorted(edges, points, side="right") - 1
     inside = [i for i in range(len(edges) - 1) if (bands == i).any()]
@@ -229,7 +231,7 @@ def _line(layout: LevelLayout, residual: Float, p: float) -> Misfit:
 
 
 def refusal(scene: str, files: Sequence[str], found: Misfit) -> str:
-    """Why recordings are refused."""
+    """Message on the refusal of recordings."""
     who = ", ".join(files) or "recordings"
     if found.order:
         return (
@@ -239,11 +241,11 @@ def refusal(scene: str, files: Sequence[str], found: Misfit) -> str:
     if found.regime:
         return (
             f"{who}: p = {found.regime_p:.3g} must be >= {LEAST_REGIME_P:g}, or the crank pin is "
-            f"not dry as in the scene {scene}: it sounds as if it ran in oil, most like "
+            f"not dry as in the scene {scene}: it seems to run in oil, most likely "
             f"{found.regime}; take recipe {OILED}, set joint.crankpin.rung, or check the pressures"
         )
     return (
         f"{who}: p = {found.p:.3g} must be >= {LEAST_P:g}, or no "
-        f"machine of the scene {scene} sounds so: {found.text}; check channels and their order, "
+        f"machine of the scene {scene} fits: {found.text}; check channels and their order, "
         "throws, geometry, conditions, and whether it is this machine"
     )

@@ -1,7 +1,7 @@
-"""Clearance of a new recording by the twin of its machine: no trained model is asked.
+"""Clearance of a new recording by the twin of its machine, without a trained model.
 
-The inversion of the calibration once more: the wear is unknown over its whole range, every other
-number as wide as the calibration left it.
+The inversion of the calibration is repeated with the wear unknown over its whole range and every
+other number as uncertain as after the calibration.
 """
 
 from collections.abc import Callable
@@ -26,31 +26,31 @@ from .misfit import Misfit, misfit
 from .unknowns import WEAR, TwinUnknowns, unknowns_of
 
 OPINION_ROUNDS = (120, 90)
-"""Members of the rounds: of all wear, then around what the first has found."""
+"""Members of the rounds: over all wear, then around the result of the first."""
 OPINION_WIDENED = (1.6, 1.6)
-"""How much wider than what is known the second is drawn: the machine is known from the start."""
+"""Widening for the second round: the machine itself is already known."""
 COVERAGE = 0.9
-"""Nominal, of the interval."""
+"""Nominal coverage of the interval."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwinOpinion:
-    """What a twin says of a recording, of :func:`second_opinion`.
+    """Estimate of a twin for a recording, from :func:`second_opinion`.
 
     Attributes
     ----------
     reason : str
-        Why nothing can be told; empty where there is an estimate.
+        Why there is no estimate; empty if there is one.
     severity, low, high : float or None
         Wear and its interval [m].
     coverage : float
-        Nominal, of the interval.
+        Nominal coverage of the interval.
     p : float
-        Of the recording among the machines that the twin takes for possible.
+        P-value of the recording among the machines that the twin considers possible.
     members : int
-        Simulated machines.
+        Number of simulated machines.
     scene : str
-        That was calibrated.
+        Calibrated scene.
     column : str
         Manifest column of the wear.
     """
@@ -66,7 +66,7 @@ class TwinOpinion:
     column: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Estimate for JSON."""
         return asdict(self)
 
 
@@ -79,18 +79,18 @@ def second_opinion(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> TwinOpinion:
-    """Wear of a recording by the twin of its machine.
+    """Estimate the wear of a recording by the twin of its machine.
 
     Parameters
     ----------
     twin : str or Path
-        Calibrated scene, or its ``.twin.toml``, of ``wearstate calibrate``.
+        Calibrated scene, or its ``.twin.toml``, from ``wearstate calibrate``.
     recording : Recording
-        Of this machine, with a tacho.
+        Recording of this machine, with a tacho.
     wear : str, optional
-        Manifest column of the wear that is asked for, to be held against the twin's.
+        Manifest column of the requested wear, checked against that of the twin.
     seed : int
-        Of draws and sensor noise, >= 0.
+        Seed of draws and sensor noise, >= 0.
     jobs : int
         Worker processes; the result does not depend on them.
     progress : callable, optional
@@ -99,7 +99,7 @@ def second_opinion(
     Raises
     ------
     DataError
-        The twin cannot be read, or is of another wear.
+        The twin cannot be read, or is for another wear.
 
     Notes
     -----
@@ -110,14 +110,14 @@ def second_opinion(
     column = plan.severities[0].column
     if wear not in (None, column):
         raise DataError(
-            f"twin: wear = {column} must be {wear}, as of the model; leave the twin out"
+            f"twin: wear = {column} must be {wear}, as for the model; leave the twin out"
         )
-    told: dict[str, Any] = {"scene": table.scene, "column": column}
+    source: dict[str, Any] = {"scene": table.scene, "column": column}
     try:
         refuse_channels(plan, [recording])
         layout, observed = layout_of(recording), levels_of(recording)[np.newaxis]
     except DataError as error:
-        return TwinOpinion(reason=str(error), **told)
+        return TwinOpinion(reason=str(error), **source)
     unknowns = unknowns_of(plan, plan.severity.extremes(), table.unknown)
     seen: list[Misfit] = []
     found = inverted(
@@ -131,11 +131,11 @@ def second_opinion(
         seed=seed,
         jobs=jobs,
         progress=progress,
-        look=lambda rows: seen.append(misfit(layout, rows, observed)),
+        check=lambda rows: seen.append(misfit(layout, rows, observed)),
     )
     severity, low, high = interval_of(found.posterior, unknowns)
     return TwinOpinion(
-        severity=severity, low=low, high=high, p=seen[0].p, members=found.members, **told
+        severity=severity, low=low, high=high, p=seen[0].p, members=found.members, **source
     )
 
 
@@ -150,7 +150,7 @@ def interval_of(posterior: Gaussian, unknowns: TwinUnknowns) -> tuple[float, flo
 
 
 def prior_of(table: TwinTable, unknowns: TwinUnknowns) -> Gaussian:
-    """What is known of a machine before a recording: its twin, and of all else the recipe."""
+    """Prior of a machine before a recording: its twin, completed by the recipe."""
     names = list(unknowns.names)
     lost = sorted(set(table.names) - set(names))
     if lost:
@@ -166,12 +166,12 @@ def prior_of(table: TwinTable, unknowns: TwinUnknowns) -> Gaussian:
 
 
 def read_twin(twin: str | Path) -> tuple[TwinTable, Path]:
-    """A twin's table and its folder.
+    """Table of a twin, and its folder.
 
     Raises
     ------
     DataError
-        There is no such file, or it is none.
+        There is no such file, or it is not a twin.
     """
     place = twin_path(twin)
     try:
@@ -183,9 +183,9 @@ def read_twin(twin: str | Path) -> tuple[TwinTable, Path]:
 
 
 def plan_of(table: TwinTable, folder: Path, sample_rate: float) -> Recipe:
-    """The recipe around the scene that was calibrated, at a sample rate [Hz]."""
+    """The recipe around the calibrated scene, at a sample rate [Hz]."""
     if not table.recipe or not table.base:
-        raise DataError("twin: recipe and base must be there, to simulate it; calibrate again")
+        raise DataError("twin: recipe and base are missing, needed to simulate it; calibrate again")
     recipe, base = (beside(folder, name) for name in (table.recipe, table.base))
     try:
         return load_recipe(recipe, {"sample_rate": sample_rate}, scene=base)

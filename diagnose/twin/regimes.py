@@ -1,9 +1,9 @@
-"""Whether recordings sound like a crank pin in oil, of a scene whose pin is dry.
+"""Whether recordings resemble an oiled crank pin although the pin of the scene is dry.
 
-What a dry pin with another law of contact can show and what oil shows overlap level by level: a
-recording of the one is no misfit of the other. So some machines of the scene are simulated with
-oil, and a linear discriminant, as the inversion has it, tells the two kinds apart. Where its answer
-lies among those of the scene's own machines, each left out, is the evidence.
+The levels of a dry pin with another contact law and those of an oiled pin overlap: a recording of
+one is no misfit of the other. Therefore some machines of the scene are simulated with oil, and a
+linear discriminant, as in the inversion, distinguishes the two kinds. The evidence is the rank of
+its value among those of the scene's own machines, each left out.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,16 +25,16 @@ from .unknowns import TwinUnknowns
 Float = NDArray[np.float64]
 
 LUBRICATION, DRY = "lubrication", "dry"
-"""Choice of that recipe, and its option that the scene has."""
+"""Choice of that recipe, and its option in the scene."""
 PER_MEMBER = 0.5
-"""Machines with oil to each one of the first ensemble."""
+"""Machines with oil per member of the first ensemble."""
 FEWEST = 10
-"""Machines with oil that run: of fewer nothing is asked."""
+"""Fewest machines with oil for a comparison."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OiledMembers:
-    """Machines of the scene whose crank pin runs in oil.
+    """Machines of the scene with an oiled crank pin.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class OiledMembers:
     names : tuple of str
         Lubrications.
     labels : ndarray [shape=(n, n_names)]
-        1 for that of each member, 0 for the others.
+        1 for the lubrication of each member, 0 for the others.
     """
 
     levels: Float
@@ -52,7 +52,7 @@ class OiledMembers:
 
 
 def oiled_unknowns(unknowns: TwinUnknowns) -> TwinUnknowns | None:
-    """The unknowns with oil in the crank pin; None where it is not dry, or its oil is unknown.
+    """Unknowns with oil in the crank pin; None if it is not dry or the recipe varies its oil.
 
     The oil is that of the built-in recipe: a film of 50 mm, whatever the pin.
     """
@@ -84,14 +84,14 @@ def oiled_members(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> OiledMembers | None:
-    """Simulate machines with oil; None where there are none, or too few run.
+    """Simulate machines with oil; None if there are none, or too few run.
 
     Parameters
     ----------
     unknowns : TwinUnknowns or None
-        Of :func:`oiled_unknowns`.
+        From :func:`oiled_unknowns`.
     count, runs, seed, jobs, progress
-        As of :func:`~.ensemble.simulated`.
+        As in :func:`~.ensemble.simulated`.
     """
     if unknowns is None:
         return None
@@ -108,24 +108,24 @@ def oiled_members(
 def with_regime(
     found: Misfit, layout: LevelLayout, rows: Float, observed: Float, oiled: OiledMembers | None
 ) -> Misfit:
-    """The misfit, and the lubrication that recordings sound like more than machines of the scene.
+    """Add to a misfit the lubrication that recordings resemble more than the scene's.
 
     Parameters
     ----------
     found : Misfit
-        Of the same recordings.
+        Misfit of the same recordings.
     layout : LevelLayout
     rows : ndarray [shape=(n, n_runs, n_levels)]
-        Of the scene's machines [dB].
+        Levels of the scene's machines [dB].
     observed : ndarray [shape=(n_runs, n_levels)]
-        Of the recordings [dB].
+        Levels of the recordings [dB].
     oiled : OiledMembers or None
-        None where nothing is asked.
+        None: no comparison.
     """
     if oiled is None or found.order:
         return found
     p, name = regime(layout, rows, observed, oiled)
-    # what fits neither dry nor oiled pins is another machine
+    # recordings that fit neither dry nor oiled pins are from another machine
     fits = found.p >= LEAST_P or far_better(misfit(layout, oiled.levels, observed), found)
     return replace(found, regime=name, regime_p=p) if p < LEAST_REGIME_P and fits else found
 
@@ -133,7 +133,7 @@ def with_regime(
 def regime(
     layout: LevelLayout, rows: Float, observed: Float, oiled: OiledMembers
 ) -> tuple[float, str]:
-    """Share of the scene's machines that sound as oiled, and the likeliest lubrication."""
+    """Share of the scene's machines that appear as oiled, and the likeliest lubrication."""
     labels = np.concatenate([np.zeros((len(rows), len(oiled.names))), oiled.labels])
     every = np.concatenate([rows, oiled.levels, observed[np.newaxis]])
     found = regressed(labels, layout.levels_of(every).reshape(len(every), -1))

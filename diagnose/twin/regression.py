@@ -1,9 +1,9 @@
 """One step of the inversion: unknowns as a linear function of levels, over an ensemble.
 
-The gain of an ensemble Kalman step is the regression of the unknowns on what is observed. Of fewer
-members than levels it is not determined, so that it is regularised; how much, each unknown decides
-by its own error on members left out. The same errors are what the step does not know: noise, levels
-that do not tell, and what is not linear. They are the posterior.
+The gain of an ensemble Kalman step is the regression of the unknowns on the observations. With
+fewer members than levels it is underdetermined and must be regularised; the strength is chosen for
+each unknown by its error on left-out members. The same errors comprise noise, uninformative levels
+and nonlinearity, and give the posterior.
 """
 
 import itertools
@@ -15,25 +15,25 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 LEAST_SCATTER = 0.5
-"""Added to the scatter of a level [dB]: no simulated level agrees better with a measured one."""
+"""Added to the scatter of a level [dB]: simulated levels agree with measured ones no better."""
 HUBER = 3.0
-"""Deviations of the ensemble beyond which a level of the recording counts less."""
+"""Standard deviations of the ensemble beyond which a level of the recording counts less."""
 STRENGTHS = 10.0 ** np.arange(-3.5, 2.1, 0.5)
-"""Regularisation, in mean eigenvalues."""
+"""Regularisation strengths, over the mean eigenvalue."""
 WEIGHTS = (0.0, 1.0, 30.0)
-"""Of each kind of further numbers beside all levels together."""
+"""Weights of each kind of further numbers, relative to all levels together."""
 
 
 @dataclass(frozen=True)
 class Regressed:
-    """TwinUnknowns of one recording by an ensemble.
+    """Unknowns of one recording, from an ensemble.
 
     Attributes
     ----------
     mean : ndarray [shape=(n_names,)]
         Normal scores.
     residuals : ndarray [shape=(n_members, n_names)]
-        Errors on members left out.
+        Errors on left-out members.
     """
 
     mean: Float
@@ -46,12 +46,12 @@ class Regressed:
 
 
 def regressed(scores: Float, levels: Float, *further: Float) -> Regressed:
-    """Regress scores on levels and more; the last row of all but the scores is the recording's.
+    """Regress scores on levels and further numbers; their last row is that of the recording.
 
     Parameters
     ----------
     scores : ndarray [shape=(n, n_names)]
-        Of the members.
+        Scores of the members.
     levels : ndarray [shape=(n + 1, n_levels)]
         [dB]
     further : ndarray [shape=(n + 1, n_numbers)]
@@ -73,7 +73,7 @@ def regressed(scores: Float, levels: Float, *further: Float) -> Regressed:
 
 
 def _scaled(rows: Float) -> Float:
-    """Deviations from the members, levels that no member has counting less."""
+    """Scaled deviations from the members' mean; levels beyond all members count less."""
     members = rows[:-1]
     scatter = np.sqrt(members.var(axis=0) + LEAST_SCATTER**2)
     found = (rows - members.mean(axis=0)) / scatter
@@ -86,7 +86,7 @@ def _products(rows: Float) -> Float:
 
 
 def _ridges(products: Float, scores: Float) -> list[tuple[Float, Float]]:
-    """Prediction and left-out errors for every strength, by one decomposition."""
+    """Prediction and left-out errors for every strength, from one decomposition."""
     count = len(scores)
     inner = products[:-1]
     last = products[-1] - inner.mean(axis=0)

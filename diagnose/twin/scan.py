@@ -1,9 +1,9 @@
 """Frequencies of casing modes from the spectrum of the running machine.
 
-The spectrum around a mode, seen from its frequency, looks alike in all members of an ensemble
-whatever that frequency. So the ensemble gives a template with its scatter, and the frequency of a
-recording is where the template fits best: a scan, as a level is no linear function of a frequency
-that moves by more than the width of its resonance.
+The spectrum around a mode, relative to its frequency, looks alike in all members of an ensemble.
+The ensemble thus gives a template with its scatter, and the frequency of a recording is where the
+template fits best. This needs a scan, because a level is not a linear function of a frequency that
+shifts by more than the width of its resonance.
 """
 
 import numpy as np
@@ -12,35 +12,35 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 HALF_WIDTH, STEP = 0.15, 0.015
-"""Of the template, in ratios of frequency: half the distance to the next mode of a usual casing."""
+"""Of the template, in log frequency: half the distance to the next mode of a usual casing."""
 LEAST_SCATTER = 0.3
-"""Of a level [dB]: what a few revolutions leave."""
+"""Smallest scatter of a level [dB], from averaging only a few revolutions."""
 SHRINKAGE = 0.05
-"""Share of the covariance that is told by its diagonal: templates have more points than a small
-ensemble tells apart."""
+"""Shrinkage of the covariance towards its diagonal: templates have more points than a small
+ensemble can resolve."""
 GRID = 161
 
 
 def scanned(
     spectra: Float, frequencies: Float, log_points: Float, between: tuple[float, float]
 ) -> Float:
-    """Frequency of one mode in every spectrum, by templates of the others.
+    """Frequency of one mode in every spectrum, using templates from the others.
 
     Parameters
     ----------
     spectra : ndarray [shape=(n, n_channels, n_points)]
-        Levels; the last row is the recording's, of which nothing is known [dB].
+        Levels [dB]; the last row is that of the recording, with unknown frequency.
     frequencies : ndarray [shape=(n - 1,)]
-        Of the mode in every other row [Hz].
+        Frequency of the mode in every other row [Hz].
     log_points : ndarray [shape=(n_points,)]
         Logarithms of the frequencies of the points.
     between : tuple of float
-        Least and largest frequency that it may have [Hz].
+        Bounds of the frequency [Hz].
 
     Returns
     -------
     ndarray [shape=(n,)]
-        Mean over the likelihood on a grid [Hz].
+        Likelihood-weighted mean on a grid [Hz].
     """
     offsets = np.arange(-HALF_WIDTH, HALF_WIDTH + STEP / 2, STEP)
     own = np.stack(

@@ -1,4 +1,4 @@
-"""What is not known of a machine: the coordinates of a recipe, and the scene at a point of them."""
+"""Unknowns of a machine: the coordinates of a recipe, and the scene at a point in them."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -33,11 +33,11 @@ class TwinUnknowns:
     Attributes
     ----------
     recipe : Recipe
-        The prior: a normal score of 0 is the middle of what it draws, in its own distribution.
+        The prior: a normal score of 0 is the median of what it draws.
     wear : Range
-        Where the wear may lie [m].
+        Range of the wear [m].
     kept : tuple of str
-        Coordinates that are unknown; all others stay as the scene has them.
+        Unknown coordinates; all others stay as in the scene.
     """
 
     recipe: Recipe
@@ -46,7 +46,7 @@ class TwinUnknowns:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of all coordinates, the wear last."""
+        """Names of all coordinates, the wear last."""
         return (*self.kept, WEAR)
 
     def values(self, scores: Float) -> dict[str, Any]:
@@ -56,12 +56,12 @@ class TwinUnknowns:
         return {**drawn, self.wear.path: self.wear.value([at[WEAR]])}
 
     def options(self, scores: Float) -> dict[str, str]:
-        """Column of every choice -> option taken."""
+        """Column of every choice -> selected option."""
         at = dict(zip(self.names, inside(scores).tolist(), strict=True))
         return machine_values((), self._choices, lambda name: at[name])[1]
 
     def scene(self, scores: Float, conditions: Mapping[str, float]) -> Scene:
-        """The machine at normal scores, run under conditions by dotted path."""
+        """Scene of the machine at normal scores, under conditions by dotted path."""
         return scene_from_table(override(self.recipe.base, {**self.values(scores), **conditions}))
 
     @property
@@ -76,26 +76,26 @@ class TwinUnknowns:
         return np.array([axis.value([each]) for each in column.tolist()])
 
     def scores(self, name: str, values: Float) -> Float:
-        """Normal scores of one uniform number at values [SI], none farther than 2.6."""
+        """Normal scores of one uniform number at values [SI], limited to 2.6."""
         low, high = self.ends(name)
         found: Float = ndtri(np.clip((values - low) / (high - low), 0.005, 0.995))
         return found
 
     def ends(self, name: str) -> tuple[float, float]:
-        """Least and largest value [SI] of one number."""
+        """Smallest and largest value [SI] of one number."""
         return self._ranges[name].extremes()
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Coordinates that are one number of the scene each."""
+        """Coordinates that correspond to one number of the scene each."""
         return tuple(self._ranges)
 
     def path_of(self, name: str) -> str:
-        """Dotted path of such a number."""
+        """Dotted path of the number of a coordinate."""
         return self._ranges[name].path
 
     def holds(self, name: str, scene: Scene) -> bool:
-        """Whether a scene has that number: options have numbers of their own."""
+        """Whether a scene has the number: options have numbers of their own."""
         path = self.path_of(name)
         return has_value(scene, path) and isinstance(value_at(scene, path), float)
 
@@ -120,20 +120,20 @@ class TwinUnknowns:
 def unknowns_of(
     recipe: Recipe, wear: tuple[float, float], only: Sequence[str] = ()
 ) -> TwinUnknowns:
-    """All that a recipe draws once per machine, or a part of it.
+    """All that a recipe draws once per machine, or a subset of it.
 
     Parameters
     ----------
     recipe : Recipe
     wear : tuple of float
-        Least and largest wear [m].
+        Smallest and largest wear [m].
     only : sequence of str
-        Paths or choices as the recipe has them, ``*`` for any; all by default.
+        Paths or choices of the recipe, ``*`` for any; by default all.
 
     Raises
     ------
     DataError
-        A name is none of the recipe's draws.
+        A name is not drawn by the recipe.
     """
     names = coordinate_names(recipe.machine, recipe.choices)
     axis = Range(recipe.severity.path, KINDS["log-uniform"], (wear,))
@@ -152,7 +152,7 @@ def unknowns_of(
 
 
 def _groups(recipe: Recipe) -> dict[str, tuple[str, ...]]:
-    """What can be named -> coordinates that go with it."""
+    """Path or choice -> its coordinates."""
     choices = {c.name: c.coordinates for c in recipe.choices if c.per == "machine"}
     return {**{axis.path: axis.entries for axis in recipe.machine}, **choices}
 
