@@ -220,7 +220,8 @@ _UNSEEN = (  # measured: docs/decisions/029-oval-eye.md and 031-loose-main-beari
         path=f"{_PIN}.one_sided",
         severity="diametral_clearance_crankpin",
         text="a crank-pin eye that has worn on its loaded side only is read as wide as it is "
-        "across the rod, a third of the limit too low; measure its clearance along the rod",
+        "across the rod, a third of the limit too low; measure its clearance along the rod, or "
+        "train on bilge-pump-oval",
     ),
     Unseen(
         path="crank.bearing.diametral_clearance",
