@@ -312,7 +312,7 @@ GOOD = "frequency_hz,acc_x/bearing_x real,acc_x/bearing_x imag\n" + "\n".join(
         ("frequency_hz", "hertz", "has no column 'frequency_hz'; the first line"),
         ("frequency_hz", "hertz", "column 'hertz' must be like 'acc_x/bearing_x real'; rename"),
         ("acc_x/bearing_x imag", "phase", "column 'phase' must be like"),
-        ("acc_x/bearing_x imag", "phase", "column 'acc_x/bearing_x imag' is missing beside"),
+        ("acc_x/bearing_x imag", "phase", "column 'acc_x/bearing_x imag' is missing next to"),
         ("bearing_x imag", "bearing_x real", "column 'acc_x/bearing_x real' is given twice"),
         ("\n3,1.0,0.5", "\n3,1.0,nan", "at 3 Hz, must be finite; measure that line again"),
         ("\n3,", "\nnan,", "has a frequency that is not finite; remove the line"),
@@ -321,7 +321,7 @@ GOOD = "frequency_hz,acc_x/bearing_x real,acc_x/bearing_x imag\n" + "\n".join(
         ("\n3,1.0,0.5", "", f"has {FEWEST_LINES - 1} lines, must have >= {FEWEST_LINES}; measure"),
         ("\n3,1.0,0.5", "\n3,1.0,half", "below the header: could not convert string 'half'"),
         ("\n3,1.0,0.5", "\n3,1.0", "below the header: the number of columns changed"),
-        (",acc_x/bearing_x real,acc_x/bearing_x imag", "", "must have 1 as the header; mend"),
+        (",acc_x/bearing_x real,acc_x/bearing_x imag", "", "must have 1 as the header; fix"),
         (GOOD, "# nothing\n", "is empty; it needs a header"),
         (GOOD, "frequency_hz\n1\n", "has no pair; add two columns"),
     ],
@@ -360,7 +360,7 @@ def test_missing_pairs_are_named_all_at_once_with_the_nearest(pump_csv):
     faults = faults_of(lambda: picked(pump_csv, ["acc_x", "acc"], [("guide", 1), ("guide_y", 1)]))
     assert len(faults) == 3
     assert "has no pair 'acc_x/guide', must have one; map it in casing.frf.pairs" in faults[0]
-    assert faults[0].endswith("to leave it silent; did you mean 'acc_x/guide_y'?")
+    assert faults[0].endswith("to ignore its force; did you mean 'acc_x/guide_y'?")
 
 
 def test_a_place_left_out_is_silent(pump_csv):
@@ -424,7 +424,9 @@ def test_beside_the_scene_first_then_the_working_directory(tmp_path, monkeypatch
     assert find_file(frf).resolve() == here / "pump.csv"
     (here / "pump.csv").unlink()
     [fault] = faults_of(lambda: find_file(frf))
-    assert fault.startswith("casing.frf.file = 'pump.csv' must be a file, is none beside the scene")
+    assert fault.startswith(
+        "casing.frf.file = 'pump.csv' must be a file; it is neither next to the scene"
+    )
     [fault] = faults_of(lambda: find_file(FrfFile(file="pump\0.csv")))
     assert "must be a file" in fault
 
@@ -529,7 +531,10 @@ def test_uff_units(tmp_path, labels, units, factor):
         ([{"orddenom_spec_data_type": 12}], "is over the quantity 12, must be force (13)"),
         ([{"abscissa_spec_data_type": 17}], "is over the abscissa 17, must be frequency (18)"),
         ([{"func_type": 6}], "has no frequency response function (58, type 4)"),
-        ([{}, {"ref_dir": 3, "x": F[:-1]}], "has other lines than '12:+X/3:-Y', export them alike"),
+        (
+            [{}, {"ref_dir": 3, "x": F[:-1]}],
+            "has other lines than '12:+X/3:-Y', export them with",
+        ),
         ([{}, {}], "has '12:+X/3:-Y' twice; export one of them"),
         ([{"ordinate_axis_units_lab": "inch/s^2"}], "is in 'inch/s^2', must be one of m/s^2"),
     ],

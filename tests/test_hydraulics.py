@@ -346,7 +346,7 @@ def test_acceleration_constant_of_one_cylinder_in_closed_form():
 def test_impossible_pumps(function):
     with pytest.raises(ValueError, match=r"crank_to_rod = 1 must be in \[0, 1\)"):
         function(1, [0.0])
-    with pytest.raises(ValueError, match="phases are empty"):
+    with pytest.raises(ValueError, match="phases must not be empty"):
         function(0.2, [])
 
 

@@ -60,7 +60,7 @@ def test_a_scar_lets_the_journal_sink_beyond_the_round_bore(turned):
 
 
 def test_a_short_film_knows_no_scar():
-    with pytest.raises(ValueError, match="rung = 'short' knows no scar"):
+    with pytest.raises(ValueError, match="rung = 'short' does not support a scar"):
         rest_curve(SHORT, "short", scar=0.2)
 
 

@@ -2,18 +2,18 @@
 
 x runs along the shaft from aft, y up, z to starboard; the shaft turns from y to z. Every node has
 four coordinates, in the order y, slope_y, z, slope_z, and node k starts at coordinate 4 k. A slope
-is the turn of the cross-section, dy/dx or dz/dx where shear is left out; the moments that do work
-on the slopes are called up and side after their planes.
+is the rotation of the cross-section, dy/dx or dz/dx without shear; the moments conjugate
+to the slopes are called up and side after their planes.
 
 ================  ======  ===============  ===========================================
 theory            shear   rotary, gyro     valid
 ================  ======  ===============  ===========================================
 euler-bernoulli   no      discs only       wave lengths above about 10 diameters
-rayleigh          no      discs and shaft  little is gained without the shear
+rayleigh          no      discs and shaft  little gain without shear
 timoshenko        yes     discs and shaft  wave lengths above about 2 diameters
 ================  ======  ===============  ===========================================
 
-Without shear the frequency of a wave of ten diameters is 5 % high, that of thirty 0.5 %.
+Without shear the frequency of a wave of ten diameters is 5 % high, of thirty 0.5 %.
 """
 
 import math
@@ -44,26 +44,26 @@ STANDARD_GRAVITY = 9.80665
 """Acceleration of gravity [m/s^2] (CGPM 1901)."""
 
 THEORIES = ("euler-bernoulli", "rayleigh", "timoshenko")
-"""Of the shaft, in the order of what they hold."""
+"""Beam theories, in the order of what they include."""
 
 COORDINATES = ("y", "slope_y", "z", "slope_z")
-"""Of one node, in order."""
+"""Coordinates of one node, in order."""
 
-_NEAREST = 1e-4  # of the shaft's length: with an element so short reactions round to 1e-7
+_NEAREST = 1e-4  # of the shaft's length: with an element this short, reactions are accurate to 1e-7
 _MOST_NODES = 20_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class InternalForces:
-    """Bending moment and shear along the shaft, ready to be drawn.
+    """Bending moment and shear along the shaft, for plotting.
 
-    Every station but the first and the last stands twice, for just aft and just forward of it,
+    Every station except the first and the last appears twice, for just aft and just forward of it,
     since a force makes the shear jump and a moment the bending moment.
 
     Attributes
     ----------
     stations : numpy.ndarray [shape=(2 n - 2,)]
-        [m]
+        Stations [m].
     moment_up, moment_side : numpy.ndarray [shape=(2 n - 2,)]
         ``E I y''`` [N m]: positive where the shaft sags, with tension below.
     shear_up, shear_side : numpy.ndarray [shape=(2 n - 2,)]
@@ -84,21 +84,21 @@ class Beam:
     Attributes
     ----------
     stations : numpy.ndarray [shape=(n,)]
-        Of the nodes, rising from 0 at the aft end [m].
+        Stations of the nodes, rising from 0 at the aft end [m].
     mass, stiffness, gyroscopic : scipy.sparse.csc_array [shape=(4 n, 4 n)]
         Symmetric, symmetric, skew. The gyroscopic one is multiplied by the speed [rad/s].
     load : numpy.ndarray [shape=(4 n,)]
-        Steady forces and moments, with gravity.
+        Steady forces and moments, including gravity.
     weight : float
-        Of shaft and discs, less buoyancy [N].
+        Weight of shaft and discs, less buoyancy [N].
     elements : Elements
     sections, discs, loads : tuple
-        As given.
+        As passed.
     theory : str
     shear_coefficient : float or str or None
-        As given.
+        As passed.
     gravity : float
-        [m/s^2]
+        Gravity [m/s^2].
     """
 
     stations: Vector
@@ -119,17 +119,17 @@ class Beam:
 
     @property
     def length(self) -> float:
-        """Of the shaft [m]."""
+        """Length of the shaft [m]."""
         return float(self.stations[-1])
 
     @property
     def n_dof(self) -> int:
-        """Count of the coordinates, four for each node."""
+        """Number of coordinates, four for each node."""
         return 4 * self.stations.size
 
     @property
     def downward_load(self) -> float:
-        """What all bearings carry together: the weight and every given load [N]."""
+        """Total load of the bearings: the weight and every given load [N]."""
         return -float(self.load[0::4].sum())
 
     def node(self, station: float) -> int:
@@ -138,13 +138,13 @@ class Beam:
         Raises
         ------
         ValueError
-            No node stands there; the message names the nearest.
+            There is no node; the message gives the nearest.
         """
         nearest = int(np.argmin(np.abs(self.stations - station)))
         if not abs(self.stations[nearest] - station) <= 2 * SAME * self.length:
             raise ValueError(
                 f"station = {station:g} m is no node, the nearest is {self.stations[nearest]:g} m; "
-                "name it in `stations` of assemble_beam"
+                "add it to `stations` of assemble_beam"
             )
         return nearest
 
@@ -154,14 +154,14 @@ class Beam:
         Parameters
         ----------
         station : float
-            [m]
+            Station [m].
         coordinate : str
             "y", "slope_y", "z" or "slope_z".
 
         Raises
         ------
         ValueError
-            No node stands there, or there is no such coordinate.
+            There is no node at the station, or no such coordinate.
         """
         if coordinate not in COORDINATES:
             raise ValueError(f"coordinate = '{coordinate}' must be one of {', '.join(COORDINATES)}")
@@ -173,12 +173,12 @@ class Beam:
         Parameters
         ----------
         deflection : array_like [shape=(4 n,)]
-            Of every coordinate [m], [rad], as a static solution gives it.
+            Displacement of every coordinate [m], [rad], for example from a static solution.
 
         Returns
         -------
         InternalForces
-            With the share of the steady load inside the elements: exact at the nodes.
+            Includes the steady load inside the elements: exact at the nodes.
 
         Raises
         ------
@@ -222,16 +222,16 @@ def assemble_beam(
     discs, loads : sequence
         Each at its own station; loads are steady.
     stations : sequence of float
-        Where further nodes shall stand: bearings, sensors, places of forces [m].
+        Further nodes: bearings, sensors, places of forces [m].
     longest_element : float, optional
-        Upper bound of the elements' length [m]; by default nodes stand only where something is.
+        Largest length of the elements [m]; by default nodes are only at named stations.
     theory : str
         One of ``THEORIES``.
     shear_coefficient : float or str
         Share k in (0, 1] of the cross-section that carries the shear, or "cowper" for
-        Cowper's of each section; must be given for *timoshenko*, has no part in the others.
+        Cowper's of each section; required for *timoshenko*, ignored for the others.
     gravity : float
-        Downward [m/s^2].
+        Downward gravity [m/s^2].
 
     Returns
     -------
@@ -241,17 +241,17 @@ def assemble_beam(
     Raises
     ------
     ValueError
-        Something is out of its range, off the shaft, or too near something else; all faults at
-        once, each with the value, the bound and a cure.
+        Something is out of range, off the shaft, or too close to something else; all faults
+        together, each with the value, the bound and a cure.
 
     Notes
     -----
-    The element's deflection is a cubic and its slope a quadratic that meet the equations of the
-    unloaded beam, so that the nodes of a static solution are exact whatever the mesh, also under
-    even loads, of which each node gets ``(q L / 2, +-q L^2 / 12)``. Mass, rotary inertia and
-    gyroscopic matrix come of the same shapes (consistent). Natural frequencies converge from above:
+    The element's deflection is a cubic and its slope a quadratic that satisfy the equations of the
+    unloaded beam, so that the nodes of a static solution are exact for any mesh, also under
+    uniform loads, of which each node gets ``(q L / 2, +-q L^2 / 12)``. Mass, rotary inertia and
+    gyroscopic matrix use the same shapes (consistent). Natural frequencies converge from above:
     by ``(beta h)^4 / 1440`` with elements of length h and the wave number beta; *timoshenko* adds
-    ``s (beta h)^2 / 24`` at most, with the share of shear over bending
+    at most ``s (beta h)^2 / 24``, with the ratio of shear to bending
     ``s = E I beta^2 / (k G A)``. Rounding grows with the inverse cube of the shortest element over
     the shaft, which therefore is bounded below.
 
@@ -305,7 +305,7 @@ def assemble_beam(
     )
 
 
-# --- what is refused
+# --- checks
 
 
 def _faults(
@@ -376,11 +376,11 @@ def _load_faults(name: str, load: PointLoad | DistributedLoad) -> Iterator[str]:
     if isinstance(load, PointLoad):
         quantities = [("up", "N"), ("side", "N"), ("moment_up", "N m"), ("moment_side", "N m")]
     elif not load.start < load.end:
-        yield f"{name}.start = {load.start} m must be < end = {load.end} m; turn them round"
+        yield f"{name}.start = {load.start} m must be < end = {load.end} m; exchange them"
     for quantity, unit in quantities:
         value = getattr(load, quantity)
         if not math.isfinite(value):
-            yield f"{name}.{quantity} = {value} {unit} must be finite; leave out what is not there"
+            yield f"{name}.{quantity} = {value} {unit} must be finite; leave out absent loads"
 
 
 def _place_faults(
@@ -410,7 +410,7 @@ def _place_faults(
     if longest_element is not None and length / longest_element + nodes.size > _MOST_NODES:
         yield (
             f"longest_element = {longest_element} m must be >= {length / _MOST_NODES:.3g} m, for "
-            f"{_MOST_NODES} nodes at most; a fifth of the least wave length will do"
+            f"{_MOST_NODES} nodes at most; a fifth of the least wave length is enough"
         )
 
 
@@ -434,7 +434,7 @@ def _named_stations(
     loads: Sequence[PointLoad | DistributedLoad],
     stations: Sequence[float],
 ) -> list[tuple[str, float]]:
-    """Name in a message and station of everything that wants a node."""
+    """Name in a message and station of everything that needs a node."""
     named = [(f"stations[{i}]", float(station)) for i, station in enumerate(stations)]
     named += [(f"discs[{i}].station", disc.station) for i, disc in enumerate(discs)]
     for i, load in enumerate(loads):

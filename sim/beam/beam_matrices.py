@@ -14,7 +14,7 @@ Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 Sparse = Any  # scipy.sparse.csc_array; scipy has no types
-SAME = 1e-9  # of the shaft's length: stations nearer than this are one
+SAME = 1e-9  # of the shaft's length: closer stations are merged
 
 
 def cowper_coefficient(poisson: float, diameter_ratio: float = 0.0) -> float:
@@ -72,12 +72,12 @@ def merged(ends: Vector, named: list[tuple[str, float]]) -> Vector:
 def mesh_nodes(
     ends: Vector, named: list[tuple[str, float]], longest_element: float | None
 ) -> Vector:
-    """Stations of the nodes [m]: named ones, ends, and what lies between."""
+    """Stations of the nodes [m]: named ones, ends, and intermediate ones."""
     nodes = merged(ends, named)
     if longest_element is None:
         return nodes
     gaps = np.diff(nodes)
-    # a gap of a whole number of elements must not get one more by rounding
+    # rounding must not add an element to a gap of a whole number of elements
     counts = np.maximum(1, np.ceil(gaps / longest_element * (1 - SAME))).astype(int)
     owner = np.repeat(np.arange(gaps.size), counts)
     step = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -150,7 +150,7 @@ def _plane_stiffness(e: Elements) -> Vector:
 
 
 def _plane_mass(e: Elements) -> Vector:
-    """Of the translation."""
+    """Mass matrix of the translation."""
     s = e.shear_ratio
     ends, turns = 312 + 588 * s + 280 * s**2, 44 + 77 * s + 35 * s**2
     across, skewed = 108 + 252 * s + 140 * s**2, 26 + 63 * s + 35 * s**2
@@ -161,7 +161,7 @@ def _plane_mass(e: Elements) -> Vector:
 
 
 def _plane_rotary(e: Elements) -> Vector:
-    """Of the rotation about a diameter."""
+    """Mass matrix of the rotation about a diameter."""
     s = e.shear_ratio
     turns, own, other = 3 - 15 * s, 4 + 5 * s + 10 * s**2, -1 - 5 * s + 5 * s**2
     rows: list[list[Any]] = [
@@ -186,7 +186,7 @@ def _sparse(n_dof: int, parts: Sequence[tuple[Any, Any, Any]]) -> Sparse:
 
 
 def _block(n_elements: int, rows: int, columns: int) -> tuple[Index, Index]:
-    """Places of a plane matrix: `rows` and `columns` are 0 for the plane of y, 2 for that of z."""
+    """Indices of a plane matrix: `rows` and `columns` are 0 for the plane of y, 2 for that of z."""
     local = np.array([0, 1, 4, 5])
     first = 4 * np.arange(n_elements)[:, None, None]
     shape = (n_elements, 4, 4)
@@ -200,12 +200,12 @@ def _both_planes(plane: Vector) -> list[tuple[Any, Any, Any]]:
 
 
 def stiffness_matrix(e: Elements) -> Sparse:
-    """Of both planes, four coordinates a node."""
+    """Stiffness of both planes, four coordinates per node."""
     return _sparse(4 * (e.length.size + 1), _both_planes(_plane_stiffness(e)))
 
 
 def mass_matrix(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
-    """With the rotary inertia of elements and discs."""
+    """Mass matrix including the rotary inertia of elements and discs."""
     parts: list[tuple[Any, Any, Any]] = _both_planes(_plane_mass(e) + _plane_rotary(e))
     for disc in discs:
         moved = disc.mass + disc.entrained_mass
@@ -216,7 +216,7 @@ def mass_matrix(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
 
 
 def gyroscopic_matrix(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
-    """What couples the two planes, over the speed."""
+    """Coupling of the two planes, over the speed."""
     polar = 2 * _plane_rotary(e)  # a circle's polar moment is twice that about a diameter
     parts: list[tuple[Any, Any, Any]] = [
         (*_block(len(polar), 0, 2), polar),

@@ -1,4 +1,4 @@
-"""What a beam is made of: sections, discs, loads, and the elements between its nodes."""
+"""Components of a beam: sections, discs, loads, and the elements between its nodes."""
 
 import math
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ class Section:
     Attributes
     ----------
     length : float
-        [m]
+        Length [m].
     outer_diameter, inner_diameter : float
-        [m]; 0 <= inner < outer.
+        Diameters [m]; 0 <= inner < outer.
     young, shear_modulus : float
-        [Pa]
+        Elastic moduli [Pa].
     density : float
-        [kg/m^3]
+        Density [kg/m^3].
 
     Examples
     --------
@@ -41,22 +41,22 @@ class Section:
 
     @property
     def area(self) -> float:
-        """Of the cross-section [m^2]."""
+        """Area of the cross-section [m^2]."""
         return math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2)
 
     @property
     def second_moment(self) -> float:
-        """Of the cross-section about a diameter [m^4]."""
+        """Second moment of the cross-section about a diameter [m^4]."""
         return math.pi / 64 * (self.outer_diameter**4 - self.inner_diameter**4)
 
     @property
     def bending_stiffness(self) -> float:
-        """E I [N m^2]."""
+        """Bending stiffness E I [N m^2]."""
         return self.young * self.second_moment
 
     @property
     def poisson(self) -> float:
-        """E / 2 G - 1."""
+        """Poisson's ratio E / 2 G - 1."""
         return self.young / (2 * self.shear_modulus) - 1
 
 
@@ -67,19 +67,19 @@ class Disc:
     Attributes
     ----------
     station : float
-        [m]
+        Position [m].
     mass : float
-        [kg]
+        Mass [kg].
     polar_inertia, diametral_inertia : float
         About the shaft's axis and about a diameter through the station [kg m^2].
     entrained_mass : float
-        Of the water that moves with it [kg]: inertia without weight.
+        Mass of the water that moves with it [kg]: inertia without weight.
     entrained_polar, entrained_diametral : float
-        The same of rotation [kg m^2]. The water is not taken to spin with the body, so it makes
-        no gyroscopic moment, and `entrained_polar` has no part in bending: it is kept here with
-        the propeller's other numbers.
+        The same for rotation [kg m^2]. The water is assumed not to spin with the body, so it has
+        no gyroscopic moment, and `entrained_polar` is not used in bending: it is kept here with
+        the propeller's other data.
     buoyancy : float
-        Upward [N]; it lessens the weight.
+        Upward force [N]; it reduces the weight.
     """
 
     station: float
@@ -99,11 +99,11 @@ class PointLoad:
     Attributes
     ----------
     station : float
-        [m]
+        Position [m].
     up, side : float
         Force along y and z [N].
     moment_up, moment_side : float
-        Moment that turns slope_y and slope_z up [N m].
+        Moment that increases slope_y and slope_z [N m].
     """
 
     station: float
@@ -115,14 +115,14 @@ class PointLoad:
 
 @dataclass(frozen=True, kw_only=True)
 class DistributedLoad:
-    """Steady force spread evenly over a stretch of the shaft.
+    """Steady force spread evenly over part of the shaft.
 
     Attributes
     ----------
     start, end : float
         Stations [m], start < end.
     up, side : float
-        Along y and z [N/m].
+        Force per length along y and z [N/m].
     """
 
     start: float
@@ -133,18 +133,18 @@ class DistributedLoad:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Elements:
-    """The elements between neighbouring stations; the fields are [shape=(n - 1,)].
+    """Elements between neighbouring stations; the fields are [shape=(n - 1,)].
 
     Attributes
     ----------
     length : numpy.ndarray
-        [m]
+        Length [m].
     bending, mass, rotary : numpy.ndarray
-        E I [N m^2], rho A [kg/m], rho I [kg m]; the last is zero where the theory has none.
+        E I [N m^2], rho A [kg/m], rho I [kg m]; the last is zero if the theory has none.
     shear_ratio : numpy.ndarray
-        ``12 E I / (k G A L^2)``; zero where the theory has no shear.
+        ``12 E I / (k G A L^2)``; zero if the theory has no shear.
     up, side : numpy.ndarray
-        Steady load with the shaft's own weight [N/m].
+        Steady load including the shaft's own weight [N/m].
     """
 
     length: Vector

@@ -18,31 +18,31 @@ from .rotor import Rotor, RotorLaw
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MOST_BISECTIONS = 12  # of a step across which a mode is not like itself
-_NARROWEST = 8  # the same where two modes change places
-_SPARE = 4  # modes that may come in from above between two speeds
+_MOST_BISECTIONS = 12  # of a step over which a mode's shape changes too much
+_NARROWEST = 8  # the same if two modes exchange places
+_SPARE = 4  # additional modes that may enter from above between two speeds
 _LEAST_MAC = 0.8  # between neighbouring speeds; below, the step is halved
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Campbell(Vibrations):
-    """Modes of a rotor followed over its speed.
+    """Modes of a rotor tracked over its speed.
 
     Attributes
     ----------
     speeds : numpy.ndarray [shape=(n_speeds,)]
-        [rad/s]
+        Speeds [rad/s].
     eigenvalues : numpy.ndarray [shape=(n_speeds, n_modes)]
-        Each column one mode [rad/s]; NaN from where the mode was lost.
+        One mode per column [rad/s]; NaN from the speed where the mode was lost.
     shapes : numpy.ndarray [shape=(n_speeds, n_dof, n_modes)]
         As in :class:`RotorModes`; NaN likewise.
     axis_ratio : numpy.ndarray [shape=(n_speeds, n_nodes, n_modes)]
         Of the orbits, as in :class:`RotorModes`; NaN likewise.
     mac : numpy.ndarray [shape=(n_speeds, n_modes)]
-        Least likeness to the shape of the step before, 1 for the same; the first row is 1.
+        Least MAC with the shape of the last step, 1 for the same; the first row is 1.
     lost_at : numpy.ndarray [shape=(n_modes,)]
-        Speed from which a mode no longer oscillates, or cannot be told from others [rad/s];
-        inf where it was followed to the end.
+        Speed from which a mode no longer oscillates, or cannot be distinguished from others
+        [rad/s]; inf if it was tracked to the end.
     """
 
     speeds: Vector
@@ -56,7 +56,7 @@ class Campbell(Vibrations):
 
     @property
     def direction(self) -> tuple[tuple[str, ...], ...]:
-        """For each speed that of each mode, as in :class:`RotorModes`; "lost" where it was."""
+        """Direction of each mode at each speed, as in :class:`RotorModes`; "lost" once lost."""
         return tuple(
             tuple("lost" if np.isnan(mode).any() else direction_of(mode) for mode in nodes.T)
             for nodes in self.axis_ratio
@@ -66,20 +66,20 @@ class Campbell(Vibrations):
 def campbell(
     rotor: Rotor | RotorLaw, speeds: ArrayLike, count: int = 6, *, most_damping: float = 1.0
 ) -> Campbell:
-    """Natural frequencies and damping over the speed, each mode followed by its shape.
+    """Natural frequencies and damping over the speed, with each mode tracked by its shape.
 
     Parameters
     ----------
     rotor : Rotor or callable
-        A function of the speed [rad/s] gives one, where films make stiffness and damping depend
-        on the speed; all with the same coordinates.
+        A function of the speed [rad/s] returns a rotor, if films make stiffness and damping depend
+        on the speed; all rotors have the same coordinates.
     speeds : array_like [shape=(n_speeds,)]
-        [rad/s], rising or falling throughout.
+        Speeds [rad/s], rising or falling throughout.
     count : int
-        Of modes to follow, the lowest at the first speed.
+        Number of modes to track, the lowest at the first speed.
     most_damping : float
-        In (0, 1]: of the modes at the first speed, as in :func:`modes`; then a mode is followed
-        half the way from there to 1.
+        In (0, 1]: for the modes at the first speed, as in :func:`modes`; afterwards a mode is
+        tracked up to half-way from there to 1.
 
     Returns
     -------
@@ -93,11 +93,11 @@ def campbell(
 
     Notes
     -----
-    Shapes of neighbouring speeds are paired so that the sum of their likeness
-    ``|a* M b|^2 / (a* M a  b* M b)`` is greatest. Where one falls below 0.8, or two modes have
-    changed places, the step is halved: so a mode is followed across a crossing, where it keeps
-    its shape, and round a veering, where it takes on the other's. A veering narrower than 1/256
-    of a step counts as a crossing; what is below 0.5 at 1/4096 of a step ends there.
+    Shapes at neighbouring speeds are paired to maximise the sum of their MAC
+    ``|a* M b|^2 / (a* M a  b* M b)``. If one falls below 0.8, or two modes have
+    exchanged places, the step is halved: so a mode is tracked across a crossing, where it keeps
+    its shape, and through a veering, where it takes on the other's. A veering narrower than 1/256
+    of a step counts as a crossing; a mode with a MAC below 0.5 at 1/4096 of a step ends there.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def campbell(
 
 
 class _Track:
-    """Modes on their way from speed to speed."""
+    """Modes tracked from speed to speed."""
 
     def __init__(self, law: RotorLaw, speed: float, count: int, most_damping: float) -> None:
         self.law = law
@@ -183,9 +183,9 @@ class _Track:
 
 
 def _swapped(old: Complex, new: Complex) -> bool:
-    """Whether two modes have changed places, by a crossing or by a veering too narrow to see.
+    """Whether two modes have exchanged places, by a crossing or by an unresolved veering.
 
-    Their eigenvalues must have come near on the way: with unlike damping modes do not mix.
+    Their eigenvalues must have been close in between: modes of different damping do not mix.
     """
     before, after = (np.subtract.outer(values, values) for values in (old, new))
     change = after - before
@@ -196,7 +196,7 @@ def _swapped(old: Complex, new: Complex) -> bool:
 
 
 def _likeness(mass: Sparse, old: Complex, values: Complex, new: Complex) -> Vector:
-    """MAC of old with new shapes; modes of one frequency are taken as the space they span."""
+    """MAC of old with new shapes; modes of equal frequency are taken as the space they span."""
     weighted = mass @ new
     size = np.sum(new.conj() * weighted, axis=0).real
     result = np.empty((old.shape[1], new.shape[1]))
@@ -211,16 +211,16 @@ def _likeness(mass: Sparse, old: Complex, values: Complex, new: Complex) -> Vect
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CriticalSpeeds:
-    """Where a mode meets an order of the speed.
+    """Intersections of a mode with an order of the speed.
 
     Attributes
     ----------
     speeds : numpy.ndarray [shape=(n,)]
         Rising [rad/s].
     damping_ratio : numpy.ndarray [shape=(n,)]
-        Of the mode there.
+        Damping ratio of the mode there.
     direction : tuple of str
-        Of its whirl. An unbalance on symmetric supports drives forward modes only.
+        Direction of its whirl. An unbalance on symmetric supports excites forward modes only.
     """
 
     speeds: Vector
@@ -245,25 +245,25 @@ def critical_speeds(
     rotor : Rotor or callable
         As in :func:`campbell`.
     speeds : array_like
-        Rising from zero [rad/s]: what meets the order below the first is not seen, nor what meets
-        it twice between two of them.
+        Rising from zero [rad/s]: intersections below the first speed are not found, nor two
+        between neighbouring speeds.
     count : int
-        Of modes followed.
+        Number of modes tracked.
     order : float
-        Of the excitation, > 0: 1 for unbalance, the count of blades for a propeller.
+        Order of the excitation, > 0: 1 for unbalance, the number of blades for a propeller.
     most_damping : float
         In (0, 1], as in :func:`campbell`.
 
     Returns
     -------
     CriticalSpeeds
-        Within 1e-10 of the speed; by the chord of the step, where a mode changes so much across
-        it that its shape cannot be found between: then give the speeds closer.
+        Within 1e-10 of the speed; by the chord of the step if a mode's shape changes too much
+        to be found in between: then choose closer speeds.
 
     Raises
     ------
     ValueError
-        The order is not above zero, or as :func:`campbell`.
+        The order is not above zero, or as in :func:`campbell`.
 
     Examples
     --------
@@ -283,7 +283,7 @@ def critical_speeds(
     law = rotor if callable(rotor) else lambda _: rotor
     table = campbell(law, speeds, count, most_damping=most_damping)
     excess = table.eigenvalues.imag - order * table.speeds[:, None]
-    known = np.isfinite(excess) & (table.eigenvalues != 0)  # rigid motions meet every order at rest
+    known = np.isfinite(excess) & (table.eigenvalues != 0)  # rigid motions meet any order at rest
     turns = known[:-1] & known[1:] & ((excess[:-1] < 0) != (excess[1:] < 0))
     places = zip(*np.nonzero(turns), strict=True)
     found = [
@@ -309,13 +309,13 @@ def _meet(
         rotor = law(speed)
         wanted = table.eigenvalues.shape[1] + _SPARE
         found = modes(rotor, speed, wanted, most_damping=most_damping)
-        alone = np.array([1.0, 2.0]) * found.eigenvalues[0]  # each end by itself, no group
+        alone = np.array([1.0, 2.0]) * found.eigenvalues[0]  # each end by itself, not as a group
         at = int(_likeness(rotor.mass, ends, alone, found.shapes).sum(axis=0).argmax())
         last["damping"], last["direction"] = found.damping_ratio[at], found.direction[at]
         return float(found.eigenvalues[at].imag) - order * speed
 
     low, high = float(table.speeds[step]), float(table.speeds[step + 1])
-    if excess(low) * excess(high) > 0:  # shapes too unlike to be told apart: the chord's root
+    if excess(low) * excess(high) > 0:  # shapes too different to be tracked: the chord's root
         ends_of = (
             table.eigenvalues[step : step + 2, mode].imag - order * table.speeds[[step, step + 1]]
         )

@@ -1,11 +1,11 @@
-"""Natural frequencies and modes of a turning shaft.
+"""Natural frequencies and modes of a rotating shaft.
 
 ==========  ======================================================================================
 eigenvalues by
 ==========  ======================================================================================
 symmetric   no damping, no rotation, symmetric supports: real modes
 dense       all eigenvalues of the inverted, shifted first-order form
-sparse      those nearest the shift, by Arnoldi's method on the factorised sparse matrix
+sparse      eigenvalues nearest the shift, by Arnoldi's method on the factorised sparse matrix
 ==========  ======================================================================================
 """
 
@@ -27,33 +27,33 @@ Complex = NDArray[np.complex128]
 
 Found = tuple[Complex, Complex, Vector]
 
-_SEED = 5  # of the first vector of a sparse search: any fixed one makes runs repeatable
-_DENSE_SYMMETRIC = 200  # coordinates; above these the sparse search is the faster
+_SEED = 5  # of the start vector of a sparse search: fixed, so that runs are repeatable
+_DENSE_SYMMETRIC = 200  # coordinates; above these the sparse search is faster
 _DENSE_GENERAL = 60
-EQUAL = 1e-8  # of an eigenvalue: nearer ones are one, its shapes any that span the same
+EQUAL = 1e-8  # of an eigenvalue: closer ones count as equal, with any shapes of the same span
 _REAL = 1e-6  # of an eigenvalue: rounding gives equal real ones an imaginary part, up to 1e-8
 _PLANAR = 1e-3  # of the major axis: an orbit with a thinner one is a line
 _SYMMETRIC = 1e-12  # of the largest entry
 
 
 class Vibrations(ABC):
-    """What complex eigenvalues tell [rad/s]."""
+    """Frequencies and damping from complex eigenvalues [rad/s]."""
 
     eigenvalues: Complex
 
     @property
     def frequency_hz(self) -> Vector:
-        """Damped, ``Im(lambda) / 2 pi`` [Hz]."""
+        """Damped frequency ``Im(lambda) / 2 pi`` [Hz]."""
         return self.eigenvalues.imag / (2 * math.pi)
 
     @property
     def undamped_frequency_hz(self) -> Vector:
-        """``|lambda| / 2 pi`` [Hz]."""
+        """Undamped frequency ``|lambda| / 2 pi`` [Hz]."""
         return np.abs(self.eigenvalues) / (2 * math.pi)
 
     @property
     def damping_ratio(self) -> Vector:
-        """``-Re(lambda) / |lambda|``; negative where the motion grows, 0 for a rigid motion."""
+        """``-Re(lambda) / |lambda|``; negative if the motion grows, 0 for a rigid motion."""
         size = np.abs(self.eigenvalues)
         return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
 
@@ -65,19 +65,19 @@ class RotorModes(Vibrations):
     Attributes
     ----------
     speed : float
-        [rad/s]
+        Speed [rad/s].
     eigenvalues : numpy.ndarray [shape=(n_modes,)]
         lambda with an imaginary part >= 0, by rising magnitude [rad/s].
     shapes : numpy.ndarray [shape=(n_dof, n_modes)]
-        Complex; each has a largest displacement of the shaft of one, taken real, or of the
-        housings where the shaft has none.
+        Complex; scaled to a largest displacement of the shaft of one, taken as real, or of the
+        housings if the shaft has none.
     forward_share : numpy.ndarray [shape=(n_modes,)]
-        Of the kinetic energy of translation, the part that whirls forward; 0.5 in a plane.
+        Share of the translational kinetic energy that whirls forward; 0.5 in a plane.
     axis_ratio : numpy.ndarray [shape=(n_nodes, n_modes)]
         Minor over major axis of the orbit at each node: 1 a forward circle, 0 a line, -1 a
-        backward circle; 0 where the node is at rest.
+        backward circle; 0 for a node at rest.
     real_eigenvalues : numpy.ndarray
-        Overdamped motions that were met on the way, not all there are [rad/s].
+        Overdamped motions found along the way; the list may be incomplete [rad/s].
     """
 
     speed: float
@@ -97,18 +97,18 @@ class RotorModes(Vibrations):
 
     @property
     def direction(self) -> tuple[str, ...]:
-        """Of each mode: "forward", "backward", "planar", or "mixed" if nodes differ."""
+        """Direction of each mode: "forward", "backward", "planar", or "mixed" if nodes differ."""
         return tuple(direction_of(ratios) for ratios in self.axis_ratio.T)
 
     @property
     def stable(self) -> bool:
-        """False where a motion that was found grows, by more than rounding."""
+        """False if a motion that was found grows by more than rounding."""
         bound = 1e-9 * np.abs(self.eigenvalues).max(initial=0.0)
         return not ((self.eigenvalues.real > bound).any() or (self.real_eigenvalues > bound).any())
 
 
 def direction_of(ratios: Vector) -> str:
-    """Way of the whirl, from the ratios of axes along the shaft."""
+    """Direction of the whirl, from the ratios of axes along the shaft."""
     forward, backward = (ratios > _PLANAR).any(), (ratios < -_PLANAR).any()
     if forward and backward:
         return "mixed"
@@ -123,19 +123,19 @@ def modes(
     most_damping: float = 1.0,
     method: str = "auto",
 ) -> RotorModes:
-    """The lowest modes of a rotor.
+    """Lowest modes of a rotor.
 
     Parameters
     ----------
     rotor : Rotor
         Shaft on its supports.
     speed : float
-        [rad/s], may be negative.
+        Speed [rad/s], may be negative.
     count : int
-        Of modes wanted, >= 1; fewer come where the rotor has fewer that oscillate.
+        Number of modes, >= 1; fewer are returned if the rotor has fewer that oscillate.
     most_damping : float
-        In (0, 1]: modes of a higher damping ratio are left out. Oil films make many that no
-        response shows; 0.5 leaves those that do.
+        In (0, 1]: modes of a higher damping ratio are omitted. Oil films have many that are not
+        visible in any response; 0.5 keeps the visible ones.
     method : str
         "dense", "sparse", or "auto" for the faster.
 
@@ -147,17 +147,17 @@ def modes(
     Raises
     ------
     ValueError
-        An argument is out of its range.
+        An argument is out of range.
     RuntimeError
         The sparse search did not converge.
 
     Notes
     -----
-    With ``v = lambda u / s`` the quadratic problem is one of first order; it is inverted about a
-    real shift s, the shaft's own first frequency, so that low modes keep their digits whatever
-    the highest of the mesh, and free shafts need no care. The search goes on until no motion of
-    lower frequency can have been missed. Of modes with one eigenvalue any combination is a mode
-    too: at rest the ones in the planes of y and z are given, else the circular ones.
+    With ``v = lambda u / s`` the quadratic problem becomes one of first order; it is inverted about
+    a real shift s, the shaft's own first frequency, so that low modes keep their digits regardless
+    of the mesh's highest, and free shafts need no special treatment. The search continues until no
+    motion of lower frequency can be missing. For modes with equal eigenvalues any combination is a
+    mode too: at rest those in the planes of y and z are returned, else the circular ones.
 
     Examples
     --------
@@ -204,13 +204,13 @@ def natural_frequencies(
     rotor : Rotor
         Shaft on its supports.
     speed : float
-        Of the shaft [rad/s], may be negative.
+        Shaft speed [rad/s], may be negative.
     count : int
-        Of modes wanted, >= 1.
+        Number of modes, >= 1.
     most_damping : float
-        In (0, 1]: modes of a higher damping ratio are left out.
+        In (0, 1]: modes of a higher damping ratio are omitted.
     method : str
-        As of :func:`modes`.
+        As in :func:`modes`.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def _checked_modes(speed: float, count: int, most_damping: float, method: str) -
     if count < 1:
         faults.append(f"count = {count} must be >= 1")
     if not 0 < most_damping <= 1:
-        faults.append(f"most_damping = {most_damping} must be in (0, 1]; 1 leaves out none")
+        faults.append(f"most_damping = {most_damping} must be in (0, 1]; 1 omits none")
     if method not in ("auto", "dense", "sparse"):
         faults.append(f"method = '{method}' must be one of auto, dense, sparse")
     if faults:
@@ -248,7 +248,7 @@ def _checked_modes(speed: float, count: int, most_damping: float, method: str) -
 
 
 def _shift(beam: Beam) -> float:
-    """First bending frequency of the shaft pinned at its ends, all mass spread, about [rad/s]."""
+    """Estimate of the shaft's first bending frequency, pinned at its ends, mass spread [rad/s]."""
     e = beam.elements
     bending = float(e.bending @ e.length) / beam.length
     mass = float(e.mass @ e.length) + sum(disc.mass + disc.entrained_mass for disc in beam.discs)
@@ -256,7 +256,7 @@ def _shift(beam: Beam) -> float:
 
 
 def _symmetric(rotor: Rotor, count: int, method: str) -> Found | None:
-    """Real modes of a rotor at rest, or None if it has none or a stiffness below zero."""
+    """Real modes of a rotor at rest, or None if it has none or a negative stiffness."""
     k, m = rotor.stiffness, rotor.mass
     skew = abs(k - k.T).max()
     if rotor.damping().count_nonzero() or skew > _SYMMETRIC * abs(k).max():
@@ -290,7 +290,7 @@ def _general(rotor: Rotor, speed: float, count: int, most_damping: float, method
     asked = 2 * count + 6
     while not dense and asked < n:
         values, states = invert.nearest(asked)
-        reach = np.abs(values - s).max() - s  # nothing slower is missing
+        reach = np.abs(values - s).max() - s  # no slower one is missing
         found = _sorted(rotor, speed, values, states, count, most_damping)
         if found[0].size == count and np.abs(found[0][-1]) <= reach:
             return found
@@ -300,7 +300,7 @@ def _general(rotor: Rotor, speed: float, count: int, most_damping: float, method
 
 
 class _Inverse:
-    """The first-order form, shifted and inverted: eigenvalues ``1 / (lambda - s)``.
+    """Shifted and inverted first-order form, with eigenvalues ``1 / (lambda - s)``.
 
     ``u = -S^-1 (s M b_v + (D + s M) b_u)``, ``v = b_u / s + u``, ``S = K + s D + s^2 M``.
     """
@@ -341,11 +341,11 @@ class _Inverse:
 def _sorted(
     rotor: Rotor, speed: float, values: Complex, shapes: Complex, count: int, most_damping: float
 ) -> Found:
-    """Oscillating ones by magnitude, behind the rigid motions, and real ones."""
+    """Rigid motions, then oscillating modes by magnitude; and real eigenvalues."""
     order = np.argsort(np.abs(values), kind="stable")
     values, shapes = values[order], shapes[:, order]
     motions = _rigid_motions(rotor)
-    rest = _zeros(rotor, speed, motions)  # split by rounding, of shapes all but parallel
+    rest = _zeros(rotor, speed, motions)  # split by rounding, with nearly parallel shapes
     size = np.abs(values[rest:])
     wanted = (values[rest:].imag > _REAL * size) & (-values[rest:].real <= most_damping * size)
     oscillating = rest + np.flatnonzero(wanted)
@@ -371,7 +371,7 @@ def _rigid_motions(rotor: Rotor) -> Vector:
 
 
 def _zeros(rotor: Rotor, speed: float, motions: Vector) -> int:
-    """Count of eigenvalues that are zero: two for a rigid motion, one where a force slows it."""
+    """Number of zero eigenvalues: two for a rigid motion, one if a force damps it."""
     if not motions.size:
         return 0
     damping = rotor.damping(speed)
@@ -383,7 +383,7 @@ def _zeros(rotor: Rotor, speed: float, motions: Vector) -> int:
 
 
 def _parted(rotor: Rotor, speed: float, values: Complex, shapes: Complex) -> Complex:
-    """Of modes with one eigenvalue, those with most and least in y, or most and least forward."""
+    """Combine modes of equal eigenvalue to most and least in y, or most and least forward."""
     parted = shapes.copy()
     first = 0
     for last in range(1, values.size + 1):

@@ -1,6 +1,6 @@
-"""A shaft on its supports, turning, and its response to unbalance.
+"""A rotating shaft on its supports, and its response to unbalance.
 
-Coordinates are those of the beam, four a node, and behind them y and z of every housing, in the
+Coordinates are those of the beam, four per node, followed by y and z of every housing, in the
 order of the supports. The shaft turns from y to z, which is forward.
 """
 
@@ -23,7 +23,7 @@ Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 PARTS = ("shaft", "housing")
-"""What a coordinate can belong to."""
+"""Parts that a coordinate can belong to."""
 
 _SUPPORT_ORDER = ("y", "z", "slope_y", "slope_z")
 
@@ -36,21 +36,21 @@ class Support:
     ----------
     name : str
     station : float
-        Of a node of the beam [m].
+        Position of a node of the beam [m].
     stiffness : array_like [shape=(2, 2) or (4, 4)]
         In the order y, z, slope_y, slope_z [N/m], [N/rad], [N m/m], [N m/rad].
     damping : array_like, optional
-        The same times a second, of the same shape; by default none.
+        The same, units times a second, of the same shape; by default none.
     housing_mass : float, optional
-        [kg]. With it the housing has y and z of its own and stands on the pedestal; moments go
-        to the ground, since a housing does not turn. Without, all goes to the ground.
+        Mass [kg]. With it the housing has its own y and z and stands on the pedestal; moments go
+        to the ground, since a housing does not turn. Without it, all goes to the ground.
     pedestal_stiffness, pedestal_damping : tuple of float
         Along y and z [N/m], [N s/m]; only with a housing.
 
     Raises
     ------
     ValueError
-        Something is out of its range; all faults at once.
+        Something is out of range; all faults together.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class Support:
         if k.shape not in ((2, 2), (4, 4)):
             yield (
                 f"support '{self.name}': stiffness of shape {k.shape} must be (2, 2), or (4, 4) "
-                f"in the order {', '.join(_SUPPORT_ORDER)}; numpy.diag makes one of two numbers"
+                f"in the order {', '.join(_SUPPORT_ORDER)}; numpy.diag makes one from two numbers"
             )
         if c.shape != k.shape:
             yield (
@@ -91,7 +91,7 @@ class Support:
         for quantity, matrix in (("stiffness", k), ("damping", c)):
             if not np.isfinite(matrix).all():
                 yield (
-                    f"support '{self.name}': {quantity} must be finite; a rigid support takes a "
+                    f"support '{self.name}': {quantity} must be finite; for a rigid support use a "
                     "thousand times the shaft's own stiffness"
                 )
 
@@ -106,7 +106,7 @@ class Support:
         if not 0 < self.housing_mass < math.inf:
             yield (
                 f"support '{self.name}': housing_mass = {self.housing_mass} kg must be > 0 and "
-                "finite; leave it out where the bearing stands on the ground"
+                "finite; leave it out for a bearing on the ground"
             )
         if self.pedestal_stiffness is None:
             yield f"support '{self.name}': pedestal_stiffness is missing; a housing stands on one"
@@ -121,16 +121,16 @@ class Support:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unbalance:
-    """A mass off the axis, that turns with the shaft.
+    """A mass off the axis that rotates with the shaft.
 
     Attributes
     ----------
     station : float
-        Of a node [m].
+        Position of a node [m].
     moment : float
         Mass times distance from the axis [kg m].
     phase : float
-        Ahead of the shaft's mark, which points along y at time zero [rad].
+        Phase ahead of the shaft's mark, which points along y at time zero [rad].
     """
 
     station: float
@@ -148,22 +148,22 @@ class Rotor:
     supports : tuple of Support
         Empty for a free shaft.
     damping_ratio : float
-        Of the shaft's own material, over the critical, in [0, 1); it holds at both ends of the
-        band, is less between and more outside.
+        Damping of the shaft's own material over critical, in [0, 1); it applies at both ends of the
+        band, with less between and more outside.
     damping_band : tuple of float, optional
-        Two frequencies [Hz], the lower may be zero; must be given with a damping ratio.
+        Two frequencies [Hz], the lower may be zero; required with a damping ratio.
 
     Raises
     ------
     ValueError
-        A support stands on no node, names repeat, or the damping is unusable; all at once.
+        A support is at no node, names repeat, or the damping is unusable; all faults together.
 
     Notes
     -----
     The shaft's damping is ``alpha M + beta K`` of the beam alone, ``alpha = 2 zeta w1 w2 /
-    (w1 + w2)``, ``beta = 2 zeta / (w1 + w2)``. It stands still, as seen by an observer: damping
-    that turned with the shaft would feed the forward whirl above the first critical speed, so
-    keep to lower speeds, or to damping that is small beside that of the supports.
+    (w1 + w2)``, ``beta = 2 zeta / (w1 + w2)``. It is stationary, as seen by an observer: rotating
+    damping would excite the forward whirl above the first critical speed, so use
+    lower speeds, or damping that is small compared with that of the supports.
 
     References
     ----------
@@ -219,11 +219,11 @@ class Rotor:
                     "give the band of interest"
                 )
         elif not 0 <= band[0] < band[1] < math.inf:
-            yield f"damping_band = {band} Hz must be 0 <= lower < upper, finite; turn them round"
+            yield f"damping_band = {band} Hz must be 0 <= lower < upper, finite; exchange them"
 
     @property
     def n_dof(self) -> int:
-        """Count of the coordinates, of the beam and of the housings."""
+        """Number of coordinates of the beam and the housings."""
         return self.beam.n_dof + 2 * len(self._housed)
 
     @cached_property
@@ -238,7 +238,7 @@ class Rotor:
         place : str or float
             Name of a support, or station of a node [m].
         coordinate : str
-            "y", "slope_y", "z" or "slope_z"; of a housing "y" or "z".
+            "y", "slope_y", "z" or "slope_z"; for a housing "y" or "z".
         part : str
             "shaft" or "housing".
 
@@ -278,7 +278,7 @@ class Rotor:
 
     @cached_property
     def stiffness(self) -> Sparse:
-        """K [shape=(n_dof, n_dof)], scipy.sparse.csc_array; symmetric where the supports are."""
+        """K [shape=(n_dof, n_dof)], scipy.sparse.csc_array; symmetric if the supports are."""
         return self._widened(self.beam.stiffness) + self._of_supports("stiffness")
 
     @cached_property
@@ -306,14 +306,14 @@ class Rotor:
         Parameters
         ----------
         speed : float
-            Of the shaft, positive from y to z [rad/s].
+            Shaft speed, positive from y to z [rad/s].
         """
         if speed == 0:
             return self._damping_at_rest
         return self._damping_at_rest + speed * self.gyroscopic
 
     def _widened(self, matrix: Sparse) -> Sparse:
-        """Room for the housings."""
+        """Extend a matrix by the housings."""
         if not self._housed:
             return matrix
         spare = csc_array((self.n_dof - self.beam.n_dof,) * 2)
@@ -334,7 +334,7 @@ class Rotor:
         return full
 
     def _local(self, support: Support, quantity: str) -> tuple[NDArray[np.int64], Vector]:
-        """Coordinates that a support joins, and its matrix over them."""
+        """Coordinates connected by a support, and its matrix for them."""
         film = getattr(support, quantity)
         names = _SUPPORT_ORDER[: len(film)]
         shaft = [self.beam.dof(support.station, name) for name in names]
@@ -353,14 +353,14 @@ RotorLaw = Callable[[float], Rotor]
 def unbalance_response(
     rotor: Rotor | RotorLaw, speeds: ArrayLike, unbalances: Sequence[Unbalance]
 ) -> Complex:
-    """Steady motion that unbalances keep up.
+    """Steady motion caused by unbalances.
 
     Parameters
     ----------
     rotor : Rotor or callable
         As in :func:`campbell`.
     speeds : array_like [shape=(n_speeds,)]
-        >= 0 [rad/s].
+        Speeds >= 0 [rad/s].
     unbalances : sequence of Unbalance
         Masses off the axis.
 
@@ -372,12 +372,12 @@ def unbalance_response(
     Raises
     ------
     ValueError
-        A speed is below zero, or an unbalance stands on no node or is not finite.
+        A speed is below zero, or an unbalance is at no node or not finite.
 
     Notes
     -----
     ``(K - Omega^2 M + i Omega (C + Omega G)) Q = F`` with ``F_y = U Omega^2 exp(i phase)`` and
-    ``F_z = -i F_y``, a force that turns with the shaft.
+    ``F_z = -i F_y``, a force that rotates with the shaft.
 
     Examples
     --------
@@ -394,7 +394,7 @@ def unbalance_response(
     """
     omega = np.atleast_1d(np.asarray(speeds, dtype=float))
     if not (np.isfinite(omega).all() and (omega >= 0).all()):
-        raise ValueError("speeds must be >= 0 and finite; turn z round for the other sense")
+        raise ValueError("speeds must be >= 0 and finite; reverse z for the other direction")
     law = rotor if callable(rotor) else lambda _: rotor
     return np.array([_unbalanced(law(float(speed)), float(speed), unbalances) for speed in omega])
 
@@ -428,7 +428,7 @@ def orbit_axes(y: Complex, z: Complex) -> tuple[Vector, Vector]:
     major : numpy.ndarray
         Major semi-axis [m].
     minor : numpy.ndarray
-        Minor semi-axis [m]; negative where the orbit runs backward, from z to y.
+        Minor semi-axis [m]; negative if the orbit runs backward, from z to y.
 
     Examples
     --------

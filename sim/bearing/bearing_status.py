@@ -9,7 +9,7 @@ Vector = NDArray[np.float64]
 
 
 class BearingStatus(Ending):
-    """How the search for an equilibrium ended. Everything but OK carries a cure."""
+    """How the search for an equilibrium ended. Every status except OK includes a cure."""
 
     OK = 0, "done"
     OVERLOAD = (
@@ -29,8 +29,8 @@ class BearingStatus(Ending):
     )
     COARSE = (
         4,
-        "the film at the equilibrium is too thin for the mesh, and the position with it; raise "
-        "n_theta, or lower the load",
+        "the film at the equilibrium is too thin for the mesh, so its position is inaccurate; "
+        "raise n_theta, or lower the load",
     )
 
 

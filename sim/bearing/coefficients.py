@@ -1,4 +1,4 @@
-"""What a film in equilibrium gives: stiffness and damping, friction, flow.
+"""Properties of a film in equilibrium: stiffness and damping, friction, flow.
 
 Stiffness and damping are ``K = -dF/dx`` and ``C = -dF/dx'``; with the tilt they are 4 x 4, in the
 order X, Y, tilt_x, tilt_y.
@@ -8,7 +8,7 @@ coefficients  by
 ============  ====================================================================================
 analytic      perturbation of the equations of the rung *direct*, the film's rim between the nodes:
               one factorisation
-mesh          the same with the rim on the nodes: exact slopes of the mesh's own force
+mesh          the same with the rim on the nodes: exact derivatives of the mesh's own force
 displacement  central differences of any rung, eight forces (sixteen with the tilt)
 ============  ====================================================================================
 """
@@ -28,7 +28,7 @@ from .equilibrium import Equilibrium
 from .film_force import DISPLACEMENT, JOURNAL_MOTIONS, angles_around, displaced_film, turn_by
 
 Vector = NDArray[np.float64]
-_RATE = 1e-5  # of the surface speed's share of a gap
+_RATE = 1e-5  # step of a rate, of the surface speed's share of a gap
 
 
 # --- stiffness and damping
@@ -42,37 +42,37 @@ def coefficients(
     Parameters
     ----------
     found : Equilibrium
-        Of :func:`equilibrium` or :func:`at_eccentricity`.
+        Result of :func:`equilibrium` or :func:`at_eccentricity`.
     method : str
         ``"analytic"`` or ``"mesh"`` (rung *direct* only), or ``"displacement"``.
     tilt : bool
-        Adds the moments and the tilt.
+        Whether to add the moments and the tilt.
 
     Returns
     -------
     Coefficients [shape=(2, 2) or (4, 4)]
-        Forces and moments fall by ``stiffness @ (X, Y, tilt_x, tilt_y)`` and by ``damping @``
+        Forces and moments decrease by ``stiffness @ (X, Y, tilt_x, tilt_y)`` and by ``damping @``
         their rates by tau. Over the magnitude of the load they are ``k C / W`` and
         ``c C omega / W``.
 
     Raises
     ------
     ValueError
-        There is no such method, or it is asked of a rung whose equations it does not know.
+        There is no such method, or it does not support the rung.
 
     Notes
     -----
-    *analytic* holds the film's rim where it is, between the nodes, and *mesh* at the nodes
-    (:mod:`.film.slopes`): the first is near the film's own coefficients, the second the exact
-    slopes of the mesh's force, as *displacement* has them but for its truncation. With *guembel*
-    all nodes are solved for, and count as far as the pressure is above zero. Under *reynolds*
-    P = 0 stays where the widest gap is at rest.
+    *analytic* holds the film's rim at its position between the nodes, and *mesh* at the nodes
+    (:mod:`.film.slopes`): the first is close to the film's own coefficients, the second gives the
+    exact derivatives of the mesh's force, like *displacement* except for its truncation. With
+    *guembel* all nodes are solved for, and count where the pressure is above zero. With *reynolds*
+    P = 0 stays at the widest gap of the equilibrium.
 
     Damping is symmetric, except with *guembel*.
 
-    Error by the mesh, of the largest coefficient of its kind, at worst of S from 0.05 to 1, L / D
+    Mesh error, over the largest coefficient of its kind, maximum for S from 0.05 to 1, L / D
     1/2 and 1, with and without two grooves: 0.7 % on 72 x 17 nodes, 0.16 % on 144 x 33 (*mesh*:
-    5 % and 1.3 %). :func:`whirl` states it for the bearing at hand.
+    5 % and 1.3 %). :func:`whirl` estimates it for a given bearing.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def coefficients(
     if method != "displacement" and found.rung != "direct":
         raise ValueError(
             f"method = '{method}' of rung '{found.rung}' must be 'displacement'; only the rung "
-            "'direct' has its equations taken apart"
+            "'direct' has a perturbation of its equations"
         )
     own = _METHODS[method](found, tilt)
     turn = np.kron(np.eye(2 if tilt else 1), turn_by(found.mesh_angle))
@@ -132,12 +132,12 @@ _METHODS: dict[str, Callable[[Equilibrium, bool], Coefficients]] = {
 
 
 def friction(found: Equilibrium) -> float:
-    """Friction on the journal, of ``eta omega R^2 L / C``.
+    """Friction on the journal, in units of ``eta omega R^2 L / C``.
 
     Parameters
     ----------
     found : Equilibrium
-        Of :func:`equilibrium` or :func:`at_eccentricity`.
+        Result of :func:`equilibrium` or :func:`at_eccentricity`.
 
     Returns
     -------
@@ -147,10 +147,10 @@ def friction(found: Equilibrium) -> float:
     Notes
     -----
     Shear of the journal's surface, ``eta U / h + (h / 2) dp/dx`` over the whole circumference, so
-    ``∬ (1/H + (H/2) dP/dtheta) dtheta dz``; where the film is ruptured the first part stays, as
-    though the streaks of oil filled the gap. The second part is taken by parts, where it is exact
-    for the mesh: with the gap's wedge, ``-∬ (P/2) dH/dtheta``. Taking the first part on the
-    pressurised region alone gives 0.55 to 0.67 of this.
+    ``∬ (1/H + (H/2) dP/dtheta) dtheta dz``; where the film is ruptured the first part is kept, as
+    if the streaks of oil filled the gap. The second part is integrated by parts, which is exact
+    for the mesh: with the gap's wedge, ``-∬ (P/2) dH/dtheta``. The first part over the
+    pressurised region alone would give 0.55 to 0.67 of this.
 
     Examples
     --------
@@ -174,14 +174,14 @@ def friction(found: Equilibrium) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Flow:
-    """Oil through a bearing, of ``R C N L`` with N in revolutions per second.
+    """Oil flow through a bearing, in units of ``R C N L`` with N in revolutions per second.
 
     Attributes
     ----------
     through : float
         Along the circumference past the widest gap.
     side : float
-        Out of both ends together.
+        Out of both ends.
     """
 
     through: float
@@ -194,19 +194,19 @@ def flow(found: Equilibrium) -> Flow:
     Parameters
     ----------
     found : Equilibrium
-        Of :func:`equilibrium` or :func:`at_eccentricity`.
+        Result of :func:`equilibrium` or :func:`at_eccentricity`.
 
     Returns
     -------
     Flow
-        Of ``R C N L``.
+        In units of ``R C N L``.
 
     Notes
     -----
     Along the circumference ``2 pi ∫ (H/2 - H^3/12 dP/dtheta) dz``, at the face behind the line of
-    the widest gap where the film begins there, else the mean over both its faces; out of the ends
+    the widest gap if the film begins there, else the mean over both its faces; out of the ends
     ``-(pi/6) (R/L)^2 ∫ H^3 dP/dz dtheta`` with the slope of a parabola through three nodes.
-    Without eccentricity the first is pi, and the second nothing.
+    Without eccentricity the first is pi, and the second zero.
 
     Examples
     --------

@@ -1,7 +1,8 @@
 """Equilibrium of a journal bearing, for any rung of the film.
 
-Non-dimensional as the film: the journal centre is over the clearance C, ``tau = omega t``, and a
-force is of ``eta omega R^3 L / C^2``, so that the Sommerfeld number is ``S = 1 / (pi |F|)``.
+Non-dimensional like the film: the journal centre is over the clearance C, ``tau = omega t``, and
+forces are in units of ``eta omega R^3 L / C^2``, so that the Sommerfeld number is
+``S = 1 / (pi |F|)``.
 """
 
 import math
@@ -36,30 +37,30 @@ _TOLERANCE = 1e-9  # of the load
 
 @dataclass(frozen=True, kw_only=True)
 class Equilibrium:
-    """Where a journal at a steady load comes to rest.
+    """Equilibrium of a journal at a steady load.
 
     Attributes
     ----------
     geometry : FilmGeometry
-        Of the film, as given.
+        Geometry of the film, as passed.
     rung : str
-        Of the film.
+        Rung of the film.
     load : numpy.ndarray [shape=(2,)]
-        Force on the journal that the film balances.
+        Force on the journal, balanced by the film.
     position : numpy.ndarray [shape=(2,)]
         Journal centre over C.
     tilt : tuple of float
-        tilt_x, tilt_y as given.
+        tilt_x, tilt_y as passed.
     mesh_angle : float
-        Direction of the mesh's first line [rad]. Not zero only for a plain, aligned bearing with
-        the condition *reynolds*, whose mesh is laid along the line of centres: P = 0 stands at
-        the widest gap and would else jump from line to line.
+        Direction of the mesh's first line [rad]. Non-zero only for a plain, aligned bearing with
+        the condition *reynolds*, whose mesh follows the line of centres: P = 0 is at
+        the widest gap and would otherwise jump from line to line.
     film : FilmSolution
-        At the equilibrium, on that mesh.
+        Film in equilibrium, on that mesh.
     residual : float
-        Force left over, of the load.
+        Residual force, over the load.
     iterations : int
-        Film solutions that were needed.
+        Number of film solutions.
     status : BearingStatus
     """
 
@@ -83,7 +84,7 @@ class Equilibrium:
 
     @property
     def attitude_angle(self) -> float:
-        """From the load to the journal centre, positive with the rotation, in (-pi, pi] [rad]."""
+        """Angle from load to journal centre, positive with the rotation, in (-pi, pi] [rad]."""
         return angle_between(self.load, self.position)
 
     @property
@@ -93,7 +94,7 @@ class Equilibrium:
 
     @property
     def state(self) -> FilmState:
-        """Of the film, on its mesh."""
+        """State of the film, on its mesh."""
         x, y = turn_by(-self.mesh_angle) @ self.position
         return FilmState(
             x=float(x), y=float(y), x_rate=0.0, y_rate=0.0, tilt_x=self.tilt[0], tilt_y=self.tilt[1]
@@ -101,12 +102,12 @@ class Equilibrium:
 
 
 def sommerfeld_number(load: float) -> float:
-    """Sommerfeld number of a non-dimensional load, and the load of a Sommerfeld number.
+    """Sommerfeld number of a non-dimensional load, or load of a Sommerfeld number.
 
     Parameters
     ----------
     load : float
-        Magnitude, of ``eta omega R^3 L / C^2``, > 0; or a Sommerfeld number.
+        Magnitude in units of ``eta omega R^3 L / C^2``, > 0; or a Sommerfeld number.
 
     Returns
     -------
@@ -138,25 +139,25 @@ def equilibrium(
     tolerance: float = _TOLERANCE,
     raise_on_failure: bool = True,
 ) -> Equilibrium:
-    """Position of the journal in which the film balances a steady load.
+    """Position of the journal in equilibrium with a steady load.
 
     Parameters
     ----------
     geometry : FilmGeometry
-        Any bore, grooves and condition that the rung knows.
+        Any bore, grooves and condition supported by the rung.
     load : array_like [shape=(2,)]
-        Force on the journal, of ``eta omega R^3 L / C^2``. A Sommerfeld number S is a load of
-        ``1 / (pi S)``.
+        Force on the journal, in units of ``eta omega R^3 L / C^2``. A Sommerfeld number S is a
+        load of ``1 / (pi S)``.
     rung : str
         ``"short"``, ``"long"``, ``"finite"`` or ``"direct"``.
     tilt : tuple of float
-        Values of tilt_x and tilt_y, held while the centre moves.
+        Values of tilt_x and tilt_y, fixed while the centre moves.
     start : array_like [shape=(2,)], optional
-        Position to start from; by default that of a short bearing.
+        Start of the search; by default the position in a short bearing.
     tolerance : float
-        Of the force left over, of the load.
+        Largest residual force, over the load.
     raise_on_failure : bool
-        False returns the last position with its status instead.
+        False: return the last position with its status instead.
 
     Returns
     -------
@@ -166,18 +167,18 @@ def equilibrium(
     Raises
     ------
     BearingError
-        No equilibrium was found; its status names the cure.
+        No equilibrium was found; its status gives the cure.
     ValueError
         The load is zero or not finite, or there is no such rung.
 
     Notes
     -----
-    Newton's method, with the analytic stiffness where the rung is *direct*. Unknowns are the
-    direction of the centre and the logit of its way to contact, equations are the logarithm and
-    the direction of the force: these are nearly straight from the lightest load to the thinnest
-    film, where the force itself grows like ``(1 - e)^(-3/2)`` and a plain Newton step would leave
-    the bore. Steps that do not bring the force closer are halved; where that does not help, the
-    plain equations are taken.
+    Newton's method, with the analytic stiffness for the rung *direct*. Unknowns are the
+    direction of the centre and the logit of its relative distance to contact; equations are the
+    logarithm and the direction of the force: these are nearly linear from the lightest load to the
+    thinnest film, where the force itself grows like ``(1 - e)^(-3/2)`` and a plain Newton step
+    would leave the bore. Steps that do not reduce the residual are halved; if that does not help,
+    the plain equations are used.
 
     Examples
     --------
@@ -230,7 +231,7 @@ def _checked_load(load: ArrayLike) -> Vector:
 
 
 def _short_position(geometry: FilmGeometry, load: Vector) -> Vector:
-    """Where a short bearing would carry the load, its force lowered as a finite length does."""
+    """Position in a short bearing, with its force reduced for the finite length."""
     square = geometry.length_to_diameter**2
     e = short_eccentricity(float(np.hypot(*load)) * (1 / square + 0.5))
     e = min(e, 0.99)
@@ -253,7 +254,7 @@ def _plain_reach(angle: float) -> float:  # noqa: ARG001 - that of any direction
 
 
 def _room(geometry: FilmGeometry, tilt: tuple[float, float]) -> Vector:
-    """Gap by the angle with the centre in the middle; a tilted journal is nearest at an end."""
+    """Gap by angle with the centre in the middle; a tilted journal is nearest at an end."""
     bore = np.zeros(geometry.n_theta) if geometry.bore is None else geometry.bore
     angle = angles_around(geometry.n_theta)
     room: Vector = 1 + bore - 0.5 * np.abs(tilt[0] * np.cos(angle) + tilt[1] * np.sin(angle))
@@ -261,7 +262,7 @@ def _room(geometry: FilmGeometry, tilt: tuple[float, float]) -> Vector:
 
 
 def _reach(room: Vector, direction: float) -> float:
-    """Largest distance of the centre from the middle before the journal touches."""
+    """Largest distance of the centre from the middle without contact."""
     cosine = np.cos(angles_around(room.size) - direction)
     ahead = cosine > 1e-6
     return float(np.min(room[ahead] / cosine[ahead]))
@@ -274,7 +275,7 @@ def at_eccentricity(
     angle: float = 0.0,
     rung: str = "direct",
 ) -> Equilibrium:
-    """Film of a journal that is held at an eccentricity, and the load that would hold it there.
+    """Film of a journal held at an eccentricity, and the load in equilibrium with it.
 
     Parameters
     ----------
@@ -282,9 +283,9 @@ def at_eccentricity(
         Bearing and cavitation condition: ``"guembel"`` (half film), ``"reynolds"`` or
         ``"periodic"``.
     eccentricity_ratio : float
-        Distance of the centres over C, 0 < e < 1 (further where the bore is worn).
+        Distance of the centres over C, 0 < e < 1 (larger if the bore is worn).
     angle : float
-        Direction of the journal centre from the X axis [rad]; it matters in a bearing with grooves
+        Direction of the journal centre from the X axis [rad]; it matters for a bearing with grooves
         or a worn bore.
     rung : str
         ``"short"``, ``"long"``, ``"finite"`` or ``"direct"``.
@@ -292,8 +293,8 @@ def at_eccentricity(
     Returns
     -------
     Equilibrium
-        As :func:`equilibrium` finds it for that load: `load`, `attitude_angle` and
-        `sommerfeld_number`; :func:`friction`, :func:`flow` and :func:`coefficients` take it.
+        As from :func:`equilibrium` for that load: `load`, `attitude_angle` and
+        `sommerfeld_number`; valid for :func:`friction`, :func:`flow` and :func:`coefficients`.
 
     Raises
     ------

@@ -29,7 +29,7 @@ RUNGS = {rung.name: rung for rung in FILM_RUNGS if rung.bearing}
 
 
 def turn_by(angle: float) -> Vector:
-    """Matrix that turns a vector [shape=(2, 2)]."""
+    """Rotation matrix [shape=(2, 2)]."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s], [s, c]])
 
@@ -111,7 +111,7 @@ def at_rest(position: Vector, tilt: tuple[float, float]) -> FilmState:
 
 
 class JournalMotion(NamedTuple):
-    """One of the four ways in which a journal can move."""
+    """One of the four motions of a journal."""
 
     name: str
     rate: str

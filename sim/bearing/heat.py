@@ -1,12 +1,12 @@
-"""Heat balance of a film: the temperature at which its oil runs.
+"""Heat balance of a film: its operating temperature.
 
-Friction heats the oil; what flows through and what the metal conducts carry the heat away,
+Friction heats the oil; the oil flow and conduction through the metal carry the heat away,
 
     (rho c Q + G) (T - T0) = P(eta(T)),
 
-with the flow Q that comes in at T0, the conductance G to surroundings at T0, and one mean
-temperature T of the film. The left side rises with T and the right side falls, as oil thins when
-it warms, so there is one solution, between T0 and ``T0 + P(eta(T0)) / (rho c Q + G)``.
+with the flow Q entering at T0, the conductance G to surroundings at T0, and one mean
+temperature T of the film. The left side rises with T and the right side falls, as warm oil is
+thinner, so there is one solution, between T0 and ``T0 + P(eta(T0)) / (rho c Q + G)``.
 """
 
 import math
@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 from .short_bearing import short_eccentricity
 
-_SETTLED = 1e-9  # of the warming
+_SETTLED = 1e-9  # of the temperature rise
 _HALVINGS = 60
 
 
@@ -27,18 +27,18 @@ def friction_power(
     length: float,
     gap: float,
 ) -> float:
-    """Friction power of a film at rest under a load, with Petroff's shear over its thinning.
+    """Friction power of a film at rest under a load: Petroff's shear, increased by eccentricity.
 
     Parameters
     ----------
     viscosity : float
-        Dynamic [Pa s].
+        Dynamic viscosity [Pa s].
     spin : float
-        Of the surfaces against each other, root of the mean square [rad/s].
+        Relative angular velocity of the surfaces, root mean square [rad/s].
     load : float
-        Root of its mean square [N].
+        Root mean square load [N].
     radius, length, gap : float
-        Of the pin, of the land, radial clearance [m].
+        Radius of the pin, length of the land, radial clearance [m].
 
     Returns
     -------
@@ -48,8 +48,8 @@ def friction_power(
 
     Notes
     -----
-    A moving load squeezes the film: over a turn of a pump's crank pin the mean of
-    ``1 / sqrt(1 - e^2)`` was 5 to 30 % off that at rest where surfaces did not touch.
+    A moving load squeezes the film: over a revolution of a pump's crank pin the mean of
+    ``1 / sqrt(1 - e^2)`` was 5 to 30 % off that at rest, if the surfaces did not touch.
 
     Examples
     --------
@@ -69,27 +69,27 @@ def friction_power(
 def film_temperature(
     inlet: float, power: Callable[[float], float], carried_per_kelvin: float
 ) -> float:
-    """Temperature at which a film gives off as much heat as its friction makes [K].
+    """Temperature at which a film's heat losses equal its friction power [K].
 
     Parameters
     ----------
     inlet : float
-        T0, of the oil that comes in and of the surroundings [K].
+        T0, of the supplied oil and of the surroundings [K].
     power : callable
-        Friction power [W] at a temperature [K], not rising. It may raise ValueError where the oil
-        is too hot for its law of viscosity: the film is then cooler than that.
+        Friction power [W] at a temperature [K], not rising. It may raise ValueError if the oil
+        is too hot for its law of viscosity: the film is then cooler.
     carried_per_kelvin : float
         ``rho c Q + G`` > 0 [W/K].
 
     Returns
     -------
     float
-        To a thousand-millionth of the warming.
+        Accurate to 1e-9 of the temperature rise.
 
     Raises
     ------
     ValueError
-        Nothing carries the heat away.
+        The heat has no way out.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def film_temperature(
         middle = 0.5 * (low + high)
         try:
             made = power(inlet + middle)
-        except ValueError:  # thinner than its law knows, so that it makes less heat than is carried
+        except ValueError:  # thinner than its law allows: less heat produced than carried away
             made = 0.0
         if made > carried_per_kelvin * middle:
             low = middle

@@ -1,4 +1,4 @@
-"""A bearing in SI, at its operating point."""
+"""A bearing at its operating point, in SI units."""
 
 import math
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JournalBearing:
-    """A bearing in SI.
+    """A bearing in SI units.
 
     Attributes
     ----------
     diameter, length : float
-        Of the bearing [m].
+        Size of the bearing [m].
     clearance : float
-        Radial, bore radius less journal radius [m].
+        Radial clearance, bore radius minus journal radius [m].
     viscosity : float
-        Dynamic [Pa s].
+        Dynamic viscosity [Pa s].
     film : FilmGeometry, optional
         Mesh, condition, bore and grooves, with the same L / D; by default a plain bearing.
 
@@ -62,7 +62,7 @@ class JournalBearing:
 
     @property
     def geometry(self) -> FilmGeometry:
-        """Of the film."""
+        """Geometry of the film."""
         if self.film is not None:
             return self.film
         return FilmGeometry(length_to_diameter=self.length / self.diameter)
@@ -75,41 +75,41 @@ class JournalBearing:
 
 @dataclass(frozen=True, kw_only=True)
 class OperatingPoint:
-    """A bearing at a speed and a load, in SI.
+    """A bearing at a speed and a load, in SI units.
 
     Attributes
     ----------
     equilibrium : Equilibrium
-        Non-dimensional.
+        Non-dimensional equilibrium.
     load : numpy.ndarray [shape=(2,)]
         Force on the journal [N].
     sommerfeld_number : float
     eccentricity_ratio : float
     attitude_angle : float
-        From the load to the journal centre [rad].
+        Angle from the load to the journal centre [rad].
     position : numpy.ndarray [shape=(2,)]
         Journal centre [m].
     least_film : float
-        [m]
+        Least film thickness [m].
     peak_pressure : float
-        [Pa]
+        Largest film pressure [Pa].
     friction_moment : float
-        On the journal [N m].
+        Friction moment on the journal [N m].
     power_loss : float
-        [W]
+        Power loss [W].
     through_flow, side_flow : float
-        Past the widest gap, and out of both ends [m^3/s].
+        Flow past the widest gap, and out of both ends [m^3/s].
     stiffness : numpy.ndarray [shape=(2, 2) or (4, 4)]
-        Of X, Y [N/m], with the tilt also of the slopes of the axis: [N/rad], [N m/m], [N m/rad].
+        For X, Y [N/m], with the tilt also for the slopes of the axis: [N/rad], [N m/m], [N m/rad].
     damping : numpy.ndarray [shape=(2, 2) or (4, 4)]
-        The same times a second.
+        The same, units times a second.
     whirl : Whirl
-        Errors of the coefficients and of the threshold by the mesh, and the finer meshes' own.
+        Mesh errors of the coefficients and of the threshold, and coefficients of the finer meshes.
     threshold : Threshold
-        Of a rigid rotor, from `whirl`; `stiffness` and `mass` are over the load.
+        Threshold of a rigid rotor, from `whirl`; `stiffness` and `mass` are over the load.
     critical_mass : float
-        Rotor mass for each bearing above which it whirls at this speed and load [kg], or may
-        whirl where not ``whirl.resolved``; inf only where it is sure that none does. Its relative
+        Rotor mass per bearing above which it whirls at this speed and load [kg], or may
+        whirl if not ``whirl.resolved``; inf only if certainly no mass whirls. Its relative
         error is twice ``whirl.speed_error``.
     """
 
@@ -146,29 +146,29 @@ def operate(
     slope: tuple[float, float] = (0.0, 0.0),
     tilt_coefficients: bool = False,
 ) -> OperatingPoint:
-    """All that a steadily loaded bearing shows, in SI.
+    """Operating point of a steadily loaded bearing, in SI units.
 
     Parameters
     ----------
     bearing : JournalBearing
-        In SI.
+        Bearing in SI units.
     speed : float
-        Of the journal, turning from X to Y [rad/s].
+        Journal speed, positive from X to Y [rad/s].
     load : array_like [shape=(2,)], optional
         Force on the journal [N]; this or `eccentricity_ratio`.
     eccentricity_ratio : float, optional
-        At which the journal is held on the X axis, without slope; the load follows.
+        Eccentricity of the journal on the X axis, without slope; the load follows.
     rung : str
-        Of the film.
+        Rung of the film.
     slope : tuple of float
-        Of the journal's axis in the bearing, in the planes XZ and YZ [rad].
+        Slope of the journal's axis in the bearing, in the planes XZ and YZ [rad].
     tilt_coefficients : bool
-        Adds moments and slopes to stiffness and damping.
+        Whether to add moments and slopes to stiffness and damping.
 
     Returns
     -------
     OperatingPoint
-        In SI.
+        In SI units.
 
     Raises
     ------
@@ -180,8 +180,8 @@ def operate(
 
     Notes
     -----
-    Isothermal and laminar. A groove's pressure is part of the film and non-dimensional, of
-    ``eta omega (R / C)^2``.
+    Isothermal and laminar. A groove's pressure is part of the film and non-dimensional, in units
+    of ``eta omega (R / C)^2``.
 
     Examples
     --------
@@ -239,7 +239,7 @@ def operate(
 
 
 def _in_metres(c: Coefficients, length: float) -> Coefficients:
-    """By slopes instead of tilts over the length, of moments instead of shares of the length."""
+    """Coefficients for slopes and moments instead of tilts and moments over the length."""
     scale = np.ones(c.stiffness.shape[0])
     scale[2:] = length
     both = np.outer(scale, scale)

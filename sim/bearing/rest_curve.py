@@ -1,11 +1,11 @@
-"""Where a plain journal comes to rest on its film, over the load: a table of static equilibria.
+"""Static equilibria of a plain journal over the load: a table.
 
-The load is of ``eta omega R^3 L / C^2``, lengths are over the radial clearance C, as in
-:mod:`.bearing.equilibrium`. A plain bore looks the same from all sides, so that one curve serves
-every direction of the load, and so it does for a scar that lies where the load presses; what is
-tabulated, the logit of the eccentricity ratio over the most that the bore allows and the attitude
-angle over the logarithm of the load, is nearly straight from the lightest load to the thinnest
-film.
+The load is in units of ``eta omega R^3 L / C^2``, lengths are over the radial clearance C, as in
+:mod:`.bearing.equilibrium`. A plain bore is rotationally symmetric, so that one curve serves
+every direction of the load; the same holds for a scar at a fixed angle from the load. The
+tabulated quantities, the logit of the eccentricity ratio over the largest one in the bore and the
+attitude angle, over the logarithm of the load, are nearly linear from the lightest load to the
+thinnest film.
 """
 
 import math
@@ -21,24 +21,24 @@ from .equilibrium import equilibrium
 
 Vector = NDArray[np.float64]
 
-_LEAST_LOAD = 1e-3  # eccentricity ratio 0.001: the film is linear below
+_LEAST_LOAD = 1e-3  # eccentricity ratio 0.001: below it the film is linear
 _MOST_ECCENTRICITY = 0.97  # beyond it the usual mesh is too coarse for the thinnest film
-_KNOTS_PER_DECADE = 7  # of the load: position within 0.3 % of the clearance, as its mesh is
+_KNOTS_PER_DECADE = 7  # of the load: position within 0.3 % of the clearance, like its mesh
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RestCurve:
-    """Static equilibria of a bearing that is the same for every direction of its load.
+    """Static equilibria of a bearing that are the same for every direction of its load.
 
     Attributes
     ----------
     most_load : float
-        End of the table [-]; beyond, and below its begin, it goes on straight.
+        End of the table [-]; linear extrapolation beyond both ends.
     spline : CubicSpline
         Logarithm of the load -> logit of the eccentricity ratio over `farthest`, attitude angle
         [rad].
     farthest : float
-        Eccentricity ratio that the bore ends at: 1, and the depth of a scar.
+        Largest eccentricity ratio in the bore: 1 plus the depth of a scar.
     """
 
     most_load: float
@@ -46,17 +46,17 @@ class RestCurve:
     farthest: float = 1.0
 
     def position(self, load: ArrayLike) -> Vector:
-        """Place of the journal's centre.
+        """Position of the journal's centre.
 
         Parameters
         ----------
         load : array_like [shape=(..., 2)]
-            On the journal, of ``eta omega R^3 L / C^2``, not zero.
+            Load on the journal, in units of ``eta omega R^3 L / C^2``, not zero.
 
         Returns
         -------
         numpy.ndarray [shape=(..., 2)]
-            Over the radial clearance.
+            Position over the radial clearance.
 
         Examples
         --------
@@ -77,29 +77,29 @@ class RestCurve:
 def rest_curve(
     geometry: FilmGeometry, rung: str = "direct", *, scar: float = 0.0, turned: float = 0.0
 ) -> RestCurve:
-    """Curve of a plain bearing, or of one worn where its load presses, from static equilibria.
+    """Curve of a plain bearing, or of one worn under its load, from static equilibria.
 
     Parameters
     ----------
     geometry : FilmGeometry
-        With a round bore and without grooves.
+        With a round bore and no grooves.
     rung : str
-        Of :func:`.bearing.equilibrium.equilibrium`; "direct" for a scar.
+        Rung of :func:`.bearing.equilibrium.equilibrium`; "direct" for a scar.
     scar : float
-        Its depth over C, in [0, 1): of :func:`.film.solve.dufrane_scar`.
+        Depth of the scar over C, in [0, 1), as in :func:`.film.solve.dufrane_scar`.
     turned : float
         Angle of its middle from the load [rad].
 
     Returns
     -------
     RestCurve
-        Made once for each film.
+        Cached for each film.
 
     Raises
     ------
     ValueError
-        The bore is not round or has grooves: its place then hangs on the direction of the load. Or
-        there is a scar, and the rung knows none.
+        The bore is not round or has grooves: the position then depends on the direction of the
+        load. Or there is a scar, which the rung does not support.
 
     Examples
     --------
@@ -111,11 +111,11 @@ def rest_curve(
     """
     if geometry.bore is not None or geometry.grooves:
         raise ValueError(
-            "bore and grooves must be absent: a scar or a groove makes the place of the journal "
-            "hang on the direction of the load; use wearstate.film.equilibrium for one load"
+            "bore and grooves must be absent: a scar or a groove makes the position of the journal "
+            "depend on the direction of the load; use wearstate.film.equilibrium for one load"
         )
     if scar and rung != "direct":
-        raise ValueError(f"rung = {rung!r} knows no scar; use 'direct'")
+        raise ValueError(f"rung = {rung!r} does not support a scar; use 'direct'")
     size = (geometry.length_to_diameter, geometry.n_theta, geometry.n_z)
     return _curve(*size, str(geometry.condition), rung, scar, turned, geometry.inlet_fill)
 

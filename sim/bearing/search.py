@@ -26,7 +26,7 @@ _LEAST_ROOM = 1e-4  # of the way to contact; no mesh resolves a thinner film
 _REACH_STEP = 1e-6  # rad
 _LEAST_LOGIT = -math.log(_LEAST_ROOM)
 _OPPOSED = 0.8  # cosine: within 37 degrees of the load
-_NEAREST = 0.9  # of the way to contact in one plain step
+_NEAREST = 0.9  # of the distance to contact in one plain step
 
 
 class SearchResult(NamedTuple):
@@ -39,7 +39,7 @@ class SearchResult(NamedTuple):
 
 
 def angle_between(first: Vector, second: Vector) -> float:
-    """From the first to the second, in (-pi, pi] [rad]."""
+    """Angle from the first to the second, in (-pi, pi] [rad]."""
     cross = first[0] * second[1] - first[1] * second[0]
     return math.atan2(cross, float(first @ second))
 
@@ -116,7 +116,7 @@ def _residual(now: FilmForce, load: Vector) -> float:
 
 
 def _at_the_wall(now: FilmForce, load: Vector) -> BearingStatus:
-    """A film that opposes the load and is too weak at the wall itself will not carry it."""
+    """Status at the wall: a film that opposes the load and is still too weak cannot carry it."""
     size = float(np.hypot(*now.force))
     against = -float(now.force @ load) / size / float(np.hypot(*load))
     weak = against > _OPPOSED and size < float(np.hypot(*load))
@@ -165,7 +165,7 @@ def _plain_path(
 
 
 def _polar(position: Vector, reach: Callable[[float], float]) -> Vector:
-    """Logit of the way to contact, and direction [rad]."""
+    """Logit of the relative distance to contact, and direction [rad]."""
     direction = math.atan2(position[1], position[0])
     share = float(np.hypot(*position)) / reach(direction)
     share = min(max(share, 1e-9), 1 - 1e-9)
@@ -178,7 +178,7 @@ def _cartesian(place: Vector, reach: Callable[[float], float]) -> Vector:
 
 
 def _log_residual(force: Vector, load: Vector) -> Vector:
-    """Logarithm of the force over the load, and the angle that it is out of line."""
+    """Logarithm of the force over the load, and its angle from the opposite direction."""
     size = float(np.hypot(*force))
     if size == 0:
         return np.array([math.inf, 0.0])
@@ -188,7 +188,7 @@ def _log_residual(force: Vector, load: Vector) -> Vector:
 def _log_step(
     now: FilmForce, load: Vector, place: Vector, reach: Callable[[float], float]
 ) -> Vector:
-    """Newton step of the logit and the direction, no longer than what a tangent can tell."""
+    """Newton step of the logit and the direction, limited to the range of the linearisation."""
     fx, fy = now.force
     of_force = np.array([[fx, fy], [-fy, fx]]) / (fx * fx + fy * fy)
     share = 1 / (1 + math.exp(-place[0]))

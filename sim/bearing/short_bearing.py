@@ -49,7 +49,7 @@ def short_attitude(eccentricity_ratio: float) -> float:
     Returns
     -------
     float
-        From the load to the journal centre [rad].
+        Angle from the load to the journal centre [rad].
 
     Examples
     --------
@@ -66,7 +66,7 @@ def short_eccentricity(load: float) -> float:
     Parameters
     ----------
     load : float
-        Non-dimensional, over ``(L / D)^2``, >= 0.
+        Non-dimensional load over ``(L / D)^2``, >= 0.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def short_eccentricity(load: float) -> float:
         raise ValueError(f"load = {load} must be >= 0 and finite; give its magnitude")
     if load == 0:
         return 0.0
-    logit = math.log(load / math.pi) / 2  # about right at both ends
+    logit = math.log(load / math.pi) / 2  # approximate at both ends
     for _ in range(MOST_ITERATIONS):
         e = 1 / (1 + math.exp(-logit))
         root = math.pi**2 * (1 - e**2) + 16 * e**2

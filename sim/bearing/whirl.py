@@ -12,24 +12,24 @@ from .coefficients import coefficients
 from .equilibrium import Equilibrium, checked_positive, equilibrium
 
 WHIRL_TOLERANCE = 0.03
-"""Error of a threshold's speed that is let pass: a damping of 5 % changes it by more."""
+"""Accepted error of a threshold's speed: a damping of 5 % changes it by more."""
 
 _FINEST = (288, 65)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Threshold:
-    """Where a rigid rotor on its bearings begins to whirl.
+    """Whirl threshold of a rigid rotor on its bearings.
 
     Attributes
     ----------
     stiffness : float
-        Equivalent stiffness at the threshold, in the unit of the stiffness given.
+        Equivalent stiffness at the threshold, in the unit of the given stiffness.
     whirl_ratio : float
-        Frequency of the whirl over that of the rotation; 0 where no speed is unstable.
+        Frequency of the whirl over that of the rotation; 0 if no speed is unstable.
     mass : float
-        ``m C omega^2 / W`` at the threshold, for coefficients over the load: the rotor's mass for
-        each bearing is stable below; inf where no speed is unstable.
+        ``m C omega^2 / W`` at the threshold, for coefficients over the load: below it, the rotor's
+        mass per bearing is stable; inf if no speed is unstable.
     """
 
     stiffness: float
@@ -48,7 +48,8 @@ def stability(c: Coefficients) -> Threshold:
     Parameters
     ----------
     c : Coefficients [shape=(2, 2) or more]
-        Over the load, as tables print them; of a larger matrix the forces by the centre.
+        Over the load, in the usual tabulated form; of a larger matrix the 2 x 2 part of forces and
+        centre.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def stability(c: Coefficients) -> Threshold:
     Raises
     ------
     ValueError
-        The damping is not positive definite: no film at rest has such a one.
+        The damping is not positive definite, which no film at rest has.
 
     Notes
     -----
@@ -68,7 +69,7 @@ def stability(c: Coefficients) -> Threshold:
         lambda^2 = ((Kxx - kappa) (Kyy - kappa) - Kxy Kyx) / (Cxx Cyy - Cxy Cyx)
         m C omega^2 / W = kappa / lambda^2
 
-    The rotor is symmetric and its tilt left out; coefficients belong to one Sommerfeld number,
+    The rotor is symmetric and its tilt neglected; coefficients belong to one Sommerfeld number,
     which itself depends on the speed.
 
     Examples
@@ -101,23 +102,23 @@ def _neutral(c: Coefficients) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Whirl:
-    """Where a rotor begins to whirl, and how far the mesh lets that be known.
+    """Whirl threshold of a rotor, and its mesh error.
 
     Attributes
     ----------
     threshold : Threshold
-        Of the coefficients over the load; where the mesh cannot tell whether there is a threshold
-        at all, the least mass that may whirl.
+        From the coefficients over the load; if the mesh leaves open whether there is a threshold,
+        the least mass that may whirl.
     coefficients : Coefficients [shape=(2, 2)]
         Over the load, extrapolated from the two finest meshes.
     stiffness_error, damping_error : float
-        By how much the extrapolation has changed the finest mesh's coefficients, at the most, of
+        Largest change of the finest mesh's coefficients by the extrapolation, over
         the largest of its kind.
     speed_error : float
-        Of `threshold.speed`, relative; 0 where no speed is unstable and the mesh leaves no doubt,
-        inf where it cannot tell, NaN where only one mesh was looked at.
+        Relative error of `threshold.speed`; 0 if certainly no speed is unstable,
+        inf if that is open, NaN if only one mesh was used.
     n_theta, n_z : int
-        Of the finest mesh.
+        Size of the finest mesh.
     """
 
     threshold: Threshold
@@ -132,24 +133,24 @@ class Whirl:
 
     @property
     def resolved(self) -> bool:
-        """Whether it is known that there is a threshold, or that there is none."""
+        """Whether it is certain that there is a threshold, or that there is none."""
         return self.speed_error < math.inf
 
 
 def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
-    """Threshold of a rigid rotor, on meshes as fine as its error asks for.
+    """Threshold of a rigid rotor, on meshes as fine as its error requires.
 
     Parameters
     ----------
     found : Equilibrium
         On the coarsest of the meshes.
     tolerance : float
-        Of the threshold's speed, > 0.
+        Largest error of the threshold's speed, > 0.
 
     Returns
     -------
     Whirl
-        Its error is above the tolerance where twice the finest mesh would have more than
+        Its error exceeds the tolerance if twice the finest mesh would have more than
         288 x 65 nodes.
 
     Raises
@@ -160,12 +161,12 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
     Notes
     -----
     The coefficients' error is of second order (:mod:`.film.slopes`): those of a mesh and of one of
-    half its width give better ones, and the change is the error stated. Of the threshold it is
+    half its width are extrapolated, and the change is the stated error. For the threshold it is
     that of ``W / (m C omega^2)``, which passes through zero where the last speed becomes stable;
-    there the relative error of the speed has no bound, and meshes are halved until the sign is
-    sure or they end. Other rungs than *direct* are looked at on their one mesh.
+    there the relative error of the speed is unbounded, and meshes are halved until the sign is
+    certain or they end. Rungs other than *direct* are used on one mesh only.
 
-    Two meshes take some 6 times the time of the first alone, a third 60 to 100 times.
+    Two meshes take about 6 times the time of the first alone, a third 60 to 100 times.
 
     Examples
     --------
@@ -204,7 +205,7 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
 
 
 def doubled(geometry: FilmGeometry) -> FilmGeometry:
-    """The same film on a mesh of half the width both ways; a bore is linear between its nodes."""
+    """The same film on a mesh of half the width both ways, with the bore interpolated linearly."""
     bore = geometry.bore
     if bore is not None:
         bore = np.stack([bore, 0.5 * (bore + np.roll(bore, -1))], axis=1).ravel()
@@ -212,7 +213,7 @@ def doubled(geometry: FilmGeometry) -> FilmGeometry:
 
 
 def _extrapolated(coarse: Coefficients, fine: Coefficients, geometry: FilmGeometry) -> Whirl:
-    """By Richardson from two meshes, the finer of half the width."""
+    """Richardson extrapolation from two meshes, the finer of half the width."""
     changes = [(b - a) / 3 for a, b in zip(coarse, fine, strict=True)]
     best = Coefficients(*(b + change for b, change in zip(fine, changes, strict=True)))
     errors = [
@@ -238,6 +239,6 @@ def _extrapolated(coarse: Coefficients, fine: Coefficients, geometry: FilmGeomet
 
 
 def _inverse_mass(c: Coefficients) -> float:
-    """W / (m C omega^2) at the threshold, below zero where no speed is unstable."""
+    """W / (m C omega^2) at the threshold; negative if no speed is unstable."""
     kappa, square = _neutral(c)
     return square / kappa if kappa > 0 else math.inf

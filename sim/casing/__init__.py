@@ -1,4 +1,4 @@
-"""Force to housing acceleration: the casing as a set of modes, or as it was measured; decimation.
+"""Force to housing acceleration: the casing as modes or measured functions; decimation.
 
 It may import ``sim.jit``, ``sim.output``, ``sim.parts``, ``sim.scene``.
 """

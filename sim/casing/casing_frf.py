@@ -1,16 +1,16 @@
-"""Measured frequency response functions of a casing: read, picked and read between the lines.
+"""Measured frequency response functions of a casing: reading, selection, interpolation.
 
 A table holds the accelerance [m/s^2/N], acceleration over force under ``exp(+j w t)``, of pairs
-named ``response/reference``: the sensor that answers and the place that is struck.
+named ``response/reference``: the sensor and the place of the force.
 
-CSV: UTF-8; delimiter ``,`` or ``;`` (with ``;`` a decimal comma is read too); lines that begin
+CSV: UTF-8; delimiter ``,`` or ``;`` (with ``;`` a decimal comma is allowed); lines that begin
 with ``#`` are comments; the first other line is the header: ``frequency_hz`` [Hz], then for every
 pair the two columns ``acc_x/bearing_x real`` and ``acc_x/bearing_x imag``, in any order.
 
 UFF (``.uff``, ``.unv``): the records of data set 58 that are frequency response functions,
-acceleration over force, through the extra ``wearstate[uff]``. A record is known by its degrees of
-freedom, ``"12:+X/3:+Y"`` (response node and direction, reference node and direction; either
-direction may be asked for reversed, which turns the sign), and by its entity names where it has
+acceleration over force, through the extra ``wearstate[uff]``. A record is identified by its degrees
+of freedom, ``"12:+X/3:+Y"`` (response node and direction, reference node and direction; either
+direction may be given reversed, which changes the sign), and by its entity names if it has
 both.
 """
 
@@ -34,11 +34,11 @@ from ..parts.wording import nearest
 from ..scene.scene import SceneError
 
 FEWEST_LINES = 16
-"""A table of fewer lines is a list of points, not a spectrum."""
+"""Least number of lines of a table: fewer are a list of points, not a spectrum."""
 
-_MOST_LINES = 2**18  # of the even grid that an uneven table is brought to
+_MOST_LINES = 2**18  # of the uniform grid to which a non-uniform table is interpolated
 _EVEN = 0.01  # of the line spacing: printed frequencies are rounded
-_ROLL_OFF = 0.125  # of the table's lines, added above it for the interpolation alone
+_ROLL_OFF = 0.125  # of the table's lines, added above it for the interpolation only
 _LEAD = 1 / 16  # of the response's length kept for times before zero
 _BACKWARD = 4.0  # energy before the blow over energy after it, of a conjugated table
 
@@ -47,16 +47,16 @@ _PATH = "casing.frf.file"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrfTable:
-    """What a file of frequency response functions holds.
+    """Contents of a file of frequency response functions.
 
     Attributes
     ----------
     frequency : numpy.ndarray [shape=(n_lines,)]
-        Rising [Hz].
+        Frequencies, rising [Hz].
     pairs : mapping of str to numpy.ndarray [shape=(n_lines,)]
         Complex accelerance [m/s^2/N] by ``response/reference``.
     sha256 : str
-        Of the file's bytes.
+        Hash of the file's bytes.
     """
 
     frequency: NDArray[np.float64]
@@ -71,11 +71,11 @@ class Accelerance:
     Attributes
     ----------
     frequency : numpy.ndarray [shape=(n_lines,)]
-        Rising [Hz].
+        Frequencies, rising [Hz].
     values : numpy.ndarray [shape=(n_outputs, n_inputs, n_lines)]
         Complex [m/s^2/N], ``exp(+j w t)``.
     sha256 : str
-        Of the file it is from; empty where it is from none.
+        Hash of the source file; empty without one.
     """
 
     frequency: NDArray[np.float64]
@@ -84,32 +84,32 @@ class Accelerance:
 
     @property
     def spacing(self) -> float:
-        """Line spacing of the even grid [Hz]; its inverse is the length of the response [s]."""
+        """Line spacing of the uniform grid [Hz]; its inverse is the length of the response [s]."""
         return _spacing(self.frequency)
 
     def at(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Accelerance between the lines, at evenly spaced frequencies.
+        """Accelerance interpolated at uniformly spaced frequencies.
 
         Parameters
         ----------
         frequency : numpy.ndarray [shape=(n_frequencies,)]
-            Evenly spaced from zero [Hz].
+            Uniformly spaced from zero [Hz].
 
         Returns
         -------
         numpy.ndarray [shape=(n_outputs, n_inputs, n_frequencies)]
-            Complex [m/s^2/N]. Below the first line that line's value times ``(f / f_first)^2``, as
-            of a casing on its mounts; above the last line zero.
+            Complex [m/s^2/N]. Below the first line, that line's value times ``(f / f_first)^2``, as
+            for a casing on its mounts; above the last line zero.
 
         Notes
         -----
-        Lines ``df`` apart determine a response shorter than ``1/df`` wholly: the lines go to the
-        time domain, and this response, with nothing after it, back to any frequency. A resonance
-        between two lines is found again, which straight lines between them would lose. What rings
-        longer than ``1/df`` folds onto the response (:func:`late_share` shows it). For the
+        Lines ``df`` apart completely determine a response shorter than ``1/df``: they are
+        transformed to the time domain, and the response, followed by zeros, back to any frequency.
+        This recovers a resonance between two lines, which linear interpolation would lose. A
+        response longer than ``1/df`` wraps around (:func:`late_share` shows it). For the
         transform the last value rolls off smoothly above the table; a sixteenth of the length is
-        kept for what comes before the blow. Uneven lines are brought to an even grid by cubic
-        splines of real and imaginary part first.
+        kept for times before the blow. Non-uniform lines are first interpolated to a uniform grid
+        by cubic splines of real and imaginary part.
 
         Examples
         --------
@@ -120,14 +120,14 @@ class Accelerance:
         >>> bool(abs(peak - 10j) < 0.01)
         True
         """
-        from scipy.signal import ZoomFFT  # half a second, for measured casings only
+        from scipy.signal import ZoomFFT  # half a second, only for measured casings
 
         response, rate = _impulse_response(self)
         lead = round(_LEAD * response.shape[-1])
         inside = frequency <= self.frequency[-1] * (1 + 1e-12)
         asked = frequency[inside]
         result = np.zeros((*self.values.shape[:2], len(frequency)), dtype=np.complex128)
-        if len(asked) < 2:  # a record of one or two samples; nothing but zero frequency
+        if len(asked) < 2:  # a record of one or two samples has only zero frequency
             result[..., : len(asked)] = response.sum(axis=-1, keepdims=True)
             return result
         zoom = ZoomFFT(response.shape[-1], [0.0, asked[-1]], len(asked), fs=rate, endpoint=True)
@@ -138,8 +138,8 @@ class Accelerance:
     def late_share(self) -> float:
         """Share of the responses' energy in the second half of their length.
 
-        Its root is about the relative error of the acceleration: above 1e-4 the lines are too far
-        apart for the damping, the response has not died away within ``1 / spacing``.
+        Its root is about the relative error of the acceleration: above 1e-4 the line spacing is too
+        large for the damping, as the response has not decayed within ``1 / spacing``.
         """
         response, _ = _impulse_response(self)
         n = response.shape[-1]
@@ -157,7 +157,7 @@ def _resonance(
 
 
 def _spacing(frequency: NDArray[np.float64]) -> float:
-    """Spacing of the even grid from zero that holds all lines, or comes close to them."""
+    """Spacing of the uniform grid from zero that contains all lines, or comes close to them."""
     even = float(frequency[-1] - frequency[0]) / (len(frequency) - 1)
     steps = np.rint(frequency / even)
     if np.abs(frequency - steps * even).max() <= _EVEN * even and (np.diff(steps) == 1).all():
@@ -166,7 +166,7 @@ def _spacing(frequency: NDArray[np.float64]) -> float:
 
 
 def _on_even_lines(accelerance: Accelerance) -> tuple[NDArray[np.complex128], float]:
-    """Values on whole multiples of the spacing, from zero to the last line, and the spacing."""
+    """Values at whole multiples of the spacing, from zero to the last line, and the spacing."""
     spacing = accelerance.spacing
     given = accelerance.frequency
     n = int(np.floor(given[-1] / spacing * (1 + 1e-9))) + 1
@@ -196,7 +196,7 @@ def _impulse_response(accelerance: Accelerance) -> tuple[NDArray[np.float64], fl
     return fft.irfft(whole, period, axis=-1), period * spacing
 
 
-# --- choosing pairs for a scene
+# --- selection of pairs for a scene
 
 
 def load_accelerance(
@@ -212,17 +212,17 @@ def load_accelerance(
         Names of the channels, the outputs.
     inputs : sequence of (str, int)
         Place and throw (1-based) of every force, the inputs. A pair whose place ends in the
-        throw (``bearing_x_2``) wins over the pair of the place.
+        throw (``bearing_x_2``) takes precedence over that of the place.
 
     Returns
     -------
     Accelerance
-        Values [shape=(n_outputs, n_inputs, n_lines)] in the order asked for.
+        Values [shape=(n_outputs, n_inputs, n_lines)] in the order of the arguments.
 
     Raises
     ------
     SceneError
-        The file is missing or cannot be used, or a pair is missing; every fault at once.
+        The file is missing or cannot be used, or a pair is missing; all faults together.
     """
     path = find_file(frf)
     status = path.stat()
@@ -244,7 +244,7 @@ def load_accelerance(
 
 
 def find_file(frf: FrfFile) -> Path:
-    """Path of the table: beside the scene file, else in the working directory.
+    """Path of the table: next to the scene file, else in the working directory.
 
     Raises
     ------
@@ -260,8 +260,8 @@ def find_file(frf: FrfFile) -> Path:
         except ValueError:  # a NUL in the name
             continue
     fault = (
-        f"{_PATH} = {frf.file!r} must be a file, is none beside the scene and none in the working "
-        "directory; copy it there or give its whole path"
+        f"{_PATH} = {frf.file!r} must be a file; it is neither next to the scene nor in the "
+        "working directory; copy it there or give its whole path"
     )
     raise SceneError(frf.file, [fault])
 
@@ -270,7 +270,7 @@ def _pair(
     table: FrfTable, frf: FrfFile, sensor: str, place: str, throw: int, faults: list[str]
 ) -> NDArray[np.complex128]:
     none = np.zeros(len(table.frequency), dtype=np.complex128)
-    # what the scene's own table names, it takes from there; the rest by the file's names
+    # names in the scene's table take precedence over those of the file
     names = {name: name for name in table.pairs} | dict(frf.pairs)
     here = {name.partition("/")[2]: name for name in names if name.startswith(f"{sensor}/")}
     key = specific_key(here, place, throw)
@@ -285,18 +285,18 @@ def _pair(
         name = f"{sensor}/{place}"
         faults.append(
             f"{_PATH} = {frf.file!r} has no pair '{name}', must have one; map it in "
-            f"casing.frf.pairs, or put '{place}' into casing.frf.without to leave it silent"
+            f"casing.frf.pairs, or put '{place}' into casing.frf.without to ignore its force"
             f"{nearest(name, table.pairs)}"
         )
     return none
 
 
 def _is_backward(accelerance: Accelerance) -> bool:
-    """A table under ``exp(-j w t)`` has its decay before the blow."""
+    """Whether a table uses ``exp(-j w t)``, which puts its decay before the blow."""
     response, _ = _impulse_response(accelerance)
     energy = np.sum(response**2, axis=(0, 1))
     n = len(energy)
-    near = max(2, n // 64)  # a bare mass answers at once, on both sides of the blow
+    near = max(2, n // 64)  # a bare mass responds at once, on both sides of the blow
     after, before = energy[near : n // 2].sum(), energy[n // 2 : n - near].sum()
     return bool(before > _BACKWARD * after and before > 0.01 * energy.sum())
 
@@ -306,7 +306,7 @@ def _is_backward(accelerance: Accelerance) -> bool:
 
 @lru_cache(maxsize=4)
 def _cached_table(path: Path, modified: int, size: int) -> FrfTable:
-    """One reading for all records of a data set; a changed file is read again."""
+    """Read a file once for all records of a data set; a changed file is read again."""
     del modified, size
     return read_frf_table(path)
 
@@ -327,7 +327,7 @@ def read_frf_table(path: str | Path) -> FrfTable:
     Raises
     ------
     SceneError
-        No such file, another suffix, a broken header or number, frequencies that do not rise,
+        No such file, another suffix, an invalid header or number, frequencies that do not rise,
         fewer than :data:`FEWEST_LINES` lines, a value that is not finite, no pair, or UFF without
         its extra.
 
@@ -419,7 +419,7 @@ def _columns(file: Path, header: list[str]) -> dict[str, tuple[int, int]]:
             continue
         columns.setdefault(pair, {})[part] = index
     faults += [
-        f"column '{pair} {part}' is missing beside the other part; add it"
+        f"column '{pair} {part}' is missing next to the other part; add it"
         for pair, parts in columns.items()
         for part in ("real", "imag")
         if part not in parts
@@ -435,9 +435,9 @@ def _numbers(file: Path, body: str, delimiter: str, width: int) -> NDArray[np.fl
     try:
         numbers = np.loadtxt(io.StringIO(body), delimiter=delimiter, ndmin=2)
     except ValueError as error:
-        raise _refusal(file, f"below the header: {error}; mend that line") from None
+        raise _refusal(file, f"below the header: {error}; correct that line") from None
     if numbers.shape[1] != width:
-        fault = f"lines have {numbers.shape[1]} cells, must have {width} as the header; mend them"
+        fault = f"lines have {numbers.shape[1]} cells, must have {width} as the header; fix them"
         raise _refusal(file, fault)
     return numbers
 
@@ -467,7 +467,7 @@ def _read_uff(file: Path, content: bytes) -> _Contents:
         raise _refusal(file, fault) from None
     try:
         sets = _read_sets(pyuff.UFF(str(file)))
-    except Exception as error:  # the library has no class of its own for a broken file
+    except Exception as error:  # the library has no error class for an invalid file
         raise _refusal(file, f"is no universal file ({error}); export it again") from None
     records = [r for r in sets if r["type"] == 58 and r["func_type"] == _FRF]
     if not records:
@@ -496,7 +496,7 @@ def _record_faults(record: Mapping[str, Any], first: Mapping[str, Any]) -> Itera
         kind = record["abscissa_spec_data_type"]
         yield f"'{name}' is over the abscissa {kind}, must be frequency (18); export spectra"
     if not np.array_equal(record["x"], first["x"]):
-        yield f"'{name}' has other lines than '{_dof_name(first)}', export them alike"
+        yield f"'{name}' has other lines than '{_dof_name(first)}', export them with equal lines"
     for label, known in (("ordinate", _ACCELERATION_UNITS), ("orddenom", _FORCE_UNITS)):
         unit = _label(record, label)
         if unit and unit.lower() not in known:
@@ -531,7 +531,7 @@ def _dof_name(record: Mapping[str, Any]) -> str:
 def _named(
     file: Path, records: Sequence[Mapping[str, Any]], system: Mapping[str, Any] | None
 ) -> dict[str, NDArray[np.complex128]]:
-    """Records by their degrees of freedom, by these reversed, and by their entity names."""
+    """Records by their degrees of freedom, by the reversed ones, and by their entity names."""
     pairs: dict[str, NDArray[np.complex128]] = {}
     faults = []
     for record in records:
@@ -551,7 +551,7 @@ def _named(
 
 
 def _reversed(record: Mapping[str, Any]) -> Iterable[tuple[str, float]]:
-    """Names of the same record with either direction turned round, and the sign that follows."""
+    """Names of the same record with either direction reversed, and the resulting sign."""
     for response, reference in ((-1, 1), (1, -1), (-1, -1)):
         turned = {
             **record,

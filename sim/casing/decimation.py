@@ -1,4 +1,4 @@
-"""Decimation of what was computed at the step rate: a low-pass of linear phase, in blocks."""
+"""Decimation of signals at the step rate: a linear-phase low-pass, in blocks."""
 
 import math
 from collections.abc import Iterator
@@ -17,20 +17,20 @@ PASS_BAND = 0.45
 _STOP_ATTENUATION_DB = 80.0
 
 BLOCK = 576  # steps
-_KEPT = 512  # samples of a block of the decimation
-PIECE = 16 * BLOCK  # steps that are driven at once: what is on its way stays near the processor
+_KEPT = 512  # samples per block of the decimation
+PIECE = 16 * BLOCK  # steps processed together: intermediate results stay in the cache
 _AT_ONCE = 8  # taps
 
 
 @kernel
 def write_rows(total: Any, first: int, n: int, row: Any) -> None:
-    """The first n values of a block, from a place of a row on."""
+    """Copy the first n values of a block to a position in a row."""
     for i in range(n):
         row[np.uint64(first + i)] = total[i]
 
 
 def pieces(rows: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    """Rows, `PIECE` steps at a time."""
+    """Rows in pieces of `PIECE` steps."""
     for first in range(0, rows.shape[1], PIECE):
         yield rows[:, first : first + PIECE]
 
@@ -39,7 +39,7 @@ def pieces(rows: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
 def decimation_filter(factor: int) -> NDArray[np.float64]:
     """Linear-phase low-pass at the step rate, before one sample in `factor` is kept.
 
-    The mean over a step is a low-pass of its own (a sinc); the filter takes its droop back, so
+    The mean over a step is itself a low-pass (a sinc); the filter compensates its droop, so
     that the result is flat to :data:`PASS_BAND` of the final rate. Half its length is a whole
     number of kept samples.
     """
@@ -55,15 +55,15 @@ def decimation_filter(factor: int) -> NDArray[np.float64]:
     return _windowed(2 * half + 1, np.append(grid, [after, 1.0]), np.append(gain, [0.0, 0.0]))
 
 
-_STEP = float(np.finfo(np.float64).eps)  # half the width of the fall at the edge
+_STEP = float(np.finfo(np.float64).eps)  # half the width of the transition
 
 
 def _windowed(
     n: int, frequency: NDArray[np.float64], gain: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Taps of linear phase whose gain is that over the Nyquist frequency, by Kaiser's window.
+    """Linear-phase taps for a gain over the Nyquist frequency, by Kaiser's window.
 
-    As ``scipy.signal.firwin2`` finds them, whose import takes as long as most simulations.
+    Same as ``scipy.signal.firwin2``, whose import takes as long as most simulations.
     """
     fine = np.linspace(0.0, 1.0, 2**15 + 1)
     turned = np.exp(-(n - 1) / 2.0 * 1j * np.pi * fine)
@@ -76,12 +76,12 @@ def _windowed(
 
 
 def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
-    """Low-pass what was sampled once a step and keep one in `factor`, without delay.
+    """Low-pass signals with one value per step and keep one in `factor`, without delay.
 
     Parameters
     ----------
     means : numpy.ndarray [shape=(n_steps, n_columns)]
-        Means over steps, or what the casing made of them.
+        Means over steps, or the casing's response to them.
     factor : int
         Steps per sample, >= 1.
 
@@ -89,7 +89,7 @@ def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
     -------
     numpy.ndarray [shape=(n_steps // factor, n_columns)]
         Row k belongs to the middle of step ``k * factor``. Within :func:`edge_samples` of either
-        end the filter runs into zeros.
+        end the filter includes zeros.
     """
     low = Decimation(means.shape[1], len(means), factor)
     low.add(means.T)
@@ -97,12 +97,12 @@ def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
 
 
 class Decimation:
-    """:func:`decimate` of rows that come piece by piece; the same bytes.
+    """:func:`decimate` for rows that arrive in pieces; the same bytes.
 
     Parameters
     ----------
     n_rows, n_steps : int
-        Shape of all pieces together.
+        Total shape of all pieces.
     factor : int
         Steps per sample, >= 1.
     """
@@ -112,13 +112,13 @@ class Decimation:
         self._kept = np.empty((n_rows, n_steps // factor))
         self._done = 0
         self._advance = _KEPT * factor
-        self._span = self._phases.size + self._advance  # steps that a block of samples looks at
+        self._span = self._phases.size + self._advance  # steps that a block of samples depends on
         self._window = np.zeros((n_rows, self._span + max(PIECE, self._advance)))
         self._filled = edge_samples(factor) * factor  # zeros before the first step
         self._scratch = np.empty(_KEPT + self._phases.shape[1]), np.empty(_KEPT)
 
     def add(self, rows: NDArray[np.float64]) -> None:
-        """Take the next steps [shape=(n_rows, n)]."""
+        """Add the next steps [shape=(n_rows, n)]."""
         for piece in pieces(rows):
             end = self._filled + piece.shape[1]
             self._window[:, self._filled : end] = piece
@@ -136,7 +136,7 @@ class Decimation:
         self._window[:, : self._filled] = self._window[:, gone : gone + self._filled]
 
     def finish(self) -> NDArray[np.float64]:
-        """Kept values [shape=(n_rows, n_steps // factor)], after the last step."""
+        """Return the kept values [shape=(n_rows, n_steps // factor)], after the last step."""
         while self._done < self._kept.shape[1]:
             self._window[:, self._filled : self._span] = 0.0
             self._filled = max(self._filled, self._span)
@@ -146,7 +146,7 @@ class Decimation:
 
 @lru_cache(maxsize=8)
 def _filter_phases(factor: int) -> NDArray[np.float64]:
-    """Every factor-th tap of the filter, from each of the first ones on, and zeros."""
+    """Polyphase components of the filter, zero-padded."""
     taps = decimation_filter(factor)
     columns = _AT_ONCE * math.ceil(len(taps) / factor / _AT_ONCE)
     padded = np.zeros(columns * factor)
@@ -156,14 +156,14 @@ def _filter_phases(factor: int) -> NDArray[np.float64]:
 
 @kernel
 def _pick(row: Any, first: int, factor: int, picked: Any) -> None:
-    """Every factor-th value."""
+    """Pick every factor-th value."""
     for i in range(picked.size):
         picked[i] = row[np.uint64(first + i * factor)]
 
 
 @kernel
 def _add_taps(total: Any, taps: Any, first: int, x: Any) -> None:
-    """Eight taps from the first on."""
+    """Add eight taps from the first on."""
     t0, t1, t2, t3 = taps[first], taps[first + 1], taps[first + 2], taps[first + 3]
     t4, t5, t6, t7 = taps[first + 4], taps[first + 5], taps[first + 6], taps[first + 7]
     for i in range(_KEPT):
@@ -178,7 +178,7 @@ _ONE, _TWO, _THREE, _FOUR, _FIVE, _SIX, _SEVEN = (np.uint64(i) for i in range(1,
 
 @kernel
 def _low_pass(rows: Any, phases: Any, picked: Any, total: Any, kept: Any) -> None:
-    """Filter and keep one in so many: of each phase of the filter, one phase of the rows."""
+    """Filter and keep one in `factor`, by polyphase components of filter and rows."""
     factor, columns = phases.shape
     n_kept = kept.shape[1]
     for c in range(len(rows)):
@@ -192,5 +192,5 @@ def _low_pass(rows: Any, phases: Any, picked: Any, total: Any, kept: Any) -> Non
 
 
 def edge_samples(factor: int) -> int:
-    """Samples at either end of a decimated record that the filter's length spoils."""
+    """Samples at either end of a decimated record that are affected by the filter's length."""
     return (len(decimation_filter(factor)) // 2) // factor

@@ -1,4 +1,4 @@
-"""The casing as it was measured: acceleration through a table of frequency response functions."""
+"""The casing as measured: acceleration through a table of frequency response functions."""
 
 import math
 from collections.abc import Callable
@@ -15,14 +15,14 @@ from .decimation import Decimation, edge_samples
 
 @dataclass(frozen=True, kw_only=True)
 class TableRun:
-    """Acceleration from measured frequency response functions, and what they left out.
+    """Acceleration from measured frequency response functions, and the neglected part.
 
     Attributes
     ----------
     acceleration : numpy.ndarray [shape=(n_outputs, n_samples)]
-        [m/s^2]
+        Acceleration [m/s^2].
     force_share_above : float
-        Share of the forces' energy, their means apart, above the table's last line.
+        Share of the forces' energy, without their means, above the table's last line.
     """
 
     acceleration: NDArray[np.float64]
@@ -32,26 +32,26 @@ class TableRun:
 class MeasuredCasing:
     """Acceleration of the housing at the sample rate, through measured responses.
 
-    The forces come piece by piece. Times and spoilt edges are those of :class:`.ModalCasing`.
+    Forces arrive in pieces. Times and affected edges are those of :class:`.ModalCasing`.
 
     Parameters
     ----------
     accelerance : Accelerance
-        From every force to every sensor.
+        Accelerance from every force to every sensor.
     step_rate : float
         Steps per second, `factor` times the sample rate.
     factor : int
         Steps per sample, >= 1.
     n_steps : int
-        Of all pieces together.
+        Total of all pieces.
 
     Notes
     -----
-    The forces are decimated, their spectrum is multiplied by the accelerance between the lines,
-    :meth:`.Accelerance.at`, and brought back. The record is padded by
+    The forces are decimated, their spectrum is multiplied by the interpolated accelerance,
+    :meth:`.Accelerance.at`, and transformed back. The record is padded by
     the length of the response, one over the line spacing, so that its end does not wrap round to
-    its beginning. The casing starts in balance with the first forces, as the modes do: they have
-    stood there for ever and meet the accelerance at zero frequency.
+    its beginning. The casing starts in equilibrium with the first forces, like the modes: they are
+    assumed to have acted forever, with the accelerance at zero frequency.
     """
 
     def __init__(
@@ -62,19 +62,19 @@ class MeasuredCasing:
         self._held = np.empty(0)
 
     def add(self, means: NDArray[np.float64]) -> None:
-        """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
+        """Add the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
         if not self._held.size:
             self._held = means[:, 0].copy()
         self._low.add(means - self._held[:, None])
 
     def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
-        """As :meth:`add`, of n steps that `write` puts into an array."""
+        """Like :meth:`add`, for n steps that `write` puts into an array."""
         means = np.empty((self.accelerance.values.shape[1], n))
         write(means)
         self.add(means)
 
     def finish(self) -> TableRun:
-        """Acceleration and what was left out, after the last step."""
+        """Return the acceleration and the neglected part, after the last step."""
         return _through_table(
             self._low.finish(), self._held, self._rate, self._factor, self.accelerance
         )
@@ -87,15 +87,15 @@ def _through_table(
     factor: int,
     accelerance: Accelerance,
 ) -> TableRun:
-    """Forces at the sample rate, less those `held` from ever, times the accelerance."""
+    """Response to forces at the sample rate, less the constant `held` ones, by the accelerance."""
     pad = math.ceil(rate / accelerance.spacing)
     edge = edge_samples(factor)
-    # the last rows run into zeros: they are led there more gently
+    # the filter includes zeros in the last rows: fade them out
     inside = forces[:, : max(1, forces.shape[1] - edge)]
     spectrum, length = padded_spectrum(inside, pad + edge)
     frequency = fft.rfftfreq(length, 1 / rate)
     rows = []
-    for values in accelerance.values:  # one sensor at a time: all at once may not fit the memory
+    for values in accelerance.values:  # one sensor at a time: all together may exceed the memory
         response = replace(accelerance, values=values[None]).at(frequency)[0]
         rows.append(
             fft.irfft(np.sum(response * spectrum, axis=0), length)[: forces.shape[1]]

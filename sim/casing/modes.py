@@ -13,12 +13,12 @@ from ..jit import kernel
 from ..parts.casing import specific_key
 from .decimation import BLOCK, PIECE, Decimation, pieces, write_rows
 
-_REACH = 3  # steps that the taps of line_inverse look ahead and back
+_REACH = 3  # steps before and after that the taps of line_inverse use
 
-# The loops below lie in vectors because each runs over one row of doubles, without branches, over a
-# number of steps that the compiler knows. Rows are longer than a block by what is looked ahead, and
-# their addresses differ by more than the processor confuses, a multiple of 4096.
-_AHEAD = 8  # steps that a mode takes at once, the widest vector of doubles
+# The loops below are vectorised, because each runs over one row of doubles, without branches, for a
+# number of steps known to the compiler. Rows are longer than a block by the overlap, and
+# their addresses do not differ by a multiple of 4096, which would conflict in the cache.
+_AHEAD = 8  # steps that a mode takes together: the widest vector of doubles
 _ROW = 640
 
 
@@ -34,19 +34,19 @@ def exact_oscillator(
     damping_ratio : float
         0 <= zeta < 1.
     step : float
-        [s]
+        Step [s].
 
     Returns
     -------
     transition : numpy.ndarray [shape=(2, 2)]
-        ``(q, q')`` at the next step per ``(q, q')`` now.
+        ``(q, q')`` at the next step from ``(q, q')`` now.
     input_gain : numpy.ndarray [shape=(2, 2)]
         Columns for the modal force now and at the next step, unit modal mass.
 
     Notes
     -----
-    The integral of the impulse response against the linear force in closed form; no time step
-    error whatever ``frequency * step`` (first-order hold).
+    Closed-form integral of the impulse response with the linear force; no time step
+    error for any ``frequency * step`` (first-order hold).
 
     Examples
     --------
@@ -62,7 +62,7 @@ def exact_oscillator(
     transition = np.array(
         [[cos + a / wd * sin, sin / wd], [-(w**2) / wd * sin, cos - a / wd * sin]]
     )
-    # responses from rest to a unit step, and to a unit ramp (the integral of the former)
+    # responses from rest to a unit step and to a unit ramp, the integral of the former
     step_q, step_v = (1 - transition[0, 0]) / w**2, transition[0, 1]
     ramp_q, ramp_v = (step - step_v - 2 * a * step_q) / w**2, step_q
     slope = np.array([ramp_q, ramp_v]) / step
@@ -71,14 +71,14 @@ def exact_oscillator(
 
 @kernel
 def _read(row: Any, first: int, block: Any) -> None:
-    """A block of forces with those about it."""
+    """Copy a block of forces with its neighbours."""
     for i in range(BLOCK + 2 * _REACH):
-        block[i] = row[np.uint64(first + i)]  # unsigned: no index counts from the end
+        block[i] = row[np.uint64(first + i)]  # unsigned: no index from the end
 
 
 @kernel
 def _raise(block: Any, taps: Any, raised: Any) -> None:
-    """Forces through the symmetric taps."""
+    """Apply the symmetric taps to the forces."""
     t0, t1, t2, t3 = taps[3], taps[4], taps[5], taps[6]
     for i in range(BLOCK):
         raised[i + _AHEAD] = (
@@ -126,7 +126,7 @@ def _add_pair(total: Any, a: float, x: Any, b: float, y: Any) -> None:
 
 @kernel
 def _gather_four(force: Any, turn: Any, real: Any, imaginary: Any) -> None:
-    """Sum of four steps' forces, each turned on by a mode until the last of them."""
+    """Sum of four steps' forces, each advanced by a mode to the last of them."""
     a1, a2, a3 = turn[0].real, turn[1].real, turn[2].real
     b1, b2, b3 = turn[0].imag, turn[1].imag, turn[2].imag
     for i in range(BLOCK + 4 * _AHEAD):
@@ -136,7 +136,7 @@ def _gather_four(force: Any, turn: Any, real: Any, imaginary: Any) -> None:
 
 @kernel
 def _turn_eight(real: Any, imaginary: Any, turn: Any, x: Any, y: Any) -> None:
-    """Every state eight steps on, from sums of four."""
+    """Advance every state by eight steps, from sums of four."""
     a4, b4, a8, b8 = turn[3].real, turn[3].imag, turn[4].real, turn[4].imag
     for i in range(BLOCK):
         pushed_x = real[i + 4] + a4 * real[i] - b4 * imaginary[i]
@@ -167,13 +167,13 @@ def _respond(
     y: Any,
     total: Any,
 ) -> None:
-    """Bare modal masses under `forces`, and what springs and dashpots of every mode take back.
+    """Response of bare modal masses to `forces`, plus that of every mode's springs and dashpots.
 
-    These feel straight lines between the forces filtered by the symmetric `taps`; where `fresh`,
-    they start in balance with the first of them. The forces are whole blocks, with those of
-    ``_REACH`` steps before and after. Coefficients are those of :class:`_Steps`; `raised` and what
-    follows are scratch, rows of ``_ROW``, of which `raised` and `states` [shape=(n_modes, 2, 8)],
-    the last eight states of every mode, go on from one call to the next.
+    The latter see linear interpolation of the forces filtered by the symmetric `taps`; if `fresh`,
+    they start in equilibrium with the first of them. The forces are whole blocks, with those of
+    ``_REACH`` steps before and after. Coefficients are those of :class:`_Steps`; `raised` and the
+    following are scratch, rows of ``_ROW``, of which `raised` and `states` [shape=(n_modes, 2, 8)],
+    the last eight states of every mode, persist between calls.
     """
     for first in range(0, acceleration.shape[1], BLOCK):
         begins = fresh and first == 0
@@ -217,7 +217,7 @@ class CasingModes:
     Attributes
     ----------
     frequency, damping_ratio : numpy.ndarray [shape=(n_modes,)]
-        [Hz], [-]
+        Natural frequencies [Hz] and damping ratios [-].
     inputs, outputs : numpy.ndarray [shape=(n_modes, n_inputs)], [shape=(n_modes, n_outputs)]
         Shapes at the forces and at the sensors [kg^-0.5].
     """
@@ -231,23 +231,23 @@ class CasingModes:
 def _steps(
     modes: CasingModes, step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]]:
-    """How modes move on by whole steps, each as one complex number.
+    """Propagation of modes over whole steps, each as one complex number.
 
     Returns
     -------
     share : numpy.ndarray [shape=(n_modes,)]
-        Acceleration of a mode at once per filtered force, beside that of its bare mass.
+        Immediate acceleration of a mode per filtered force, in addition to that of its bare mass.
     turns : numpy.ndarray [shape=(n_modes, 6)]
-        Factors of the state over 1, 2, 3, 4 and 8 steps, and state in balance per force.
+        Factors of the state over 1, 2, 3, 4 and 8 steps, and the equilibrium state per force.
     swings : numpy.ndarray [shape=(n_modes,)]
-        Imaginary part of it times the state: acceleration by the forces before.
+        Acceleration by earlier forces is the imaginary part of this times the state.
 
     Notes
     -----
-    With ``p = -zeta w + j w_d`` the state ``z = q' - conj(p) q`` obeys ``z' = p z + f``; of it
-    ``q = Im(z) / w_d``, and springs and dashpots add ``Im(p^2 z) / w_d`` to the bare mass. Under
-    straight lines, ``z[n+1] = t z[n] + g0 f[n] + g1 f[n+1]`` with ``t = exp(p step)``, so that
-    ``z = (t g1 + g0) r + g1 f`` where ``r[n+1] = t r[n] + f[n]``. The factors follow from
+    With ``p = -zeta w + j w_d`` the state ``z = q' - conj(p) q`` obeys ``z' = p z + f``; from it
+    ``q = Im(z) / w_d``, and springs and dashpots add ``Im(p^2 z) / w_d`` to the bare mass. For
+    piecewise linear forces, ``z[n+1] = t z[n] + g0 f[n] + g1 f[n+1]`` with ``t = exp(p step)``, so
+    that ``z = (t g1 + g0) r + g1 f`` where ``r[n+1] = t r[n] + f[n]``. The factors follow from
     :func:`exact_oscillator`.
     """
     pairs = [
@@ -268,7 +268,7 @@ def _steps(
 
 
 class _ModesInMotion:
-    """Modes of a casing under forces that come piece by piece, their springs feeling `taps`."""
+    """Modes of a casing under forces that arrive in pieces, with springs driven through `taps`."""
 
     def __init__(self, modes: CasingModes, taps: NDArray[np.float64], step_rate: float) -> None:
         share, turns, swings = _steps(modes, 1 / step_rate)
@@ -292,17 +292,17 @@ class _ModesInMotion:
         )
 
     def add(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take ``PIECE`` steps at most; the acceleration of those that are known by now."""
+        """Add at most ``PIECE`` steps; return the acceleration of the steps completed by now."""
         self.room(forces.shape[1])[:] = forces
         return self.take(forces.shape[1])
 
     def room(self, n: int) -> NDArray[np.float64]:
-        """Where the next n steps' forces are to be written, ``PIECE`` at most."""
+        """Buffer for the next n steps' forces, at most ``PIECE``."""
         first = self._filled or _REACH
         return self._window[:, first : first + n]
 
     def take(self, n: int) -> NDArray[np.float64]:
-        """As :meth:`add`, of n steps that have been written into :meth:`room`."""
+        """Like :meth:`add`, for n steps already written into :meth:`room`."""
         if not self._filled:
             self._window[:, :_REACH] = self._window[:, _REACH : _REACH + 1]
             self._filled = _REACH
@@ -317,7 +317,7 @@ class _ModesInMotion:
         return acceleration
 
     def finish(self) -> NDArray[np.float64]:
-        """Acceleration of what is left; the last forces stand."""
+        """Return the acceleration of the remaining steps, with constant last forces."""
         left = self._filled - _REACH
         last = self._window[:, self._filled - 1 : self._filled]
         more = -(-left // BLOCK) * BLOCK + 2 * _REACH - self._filled
@@ -328,7 +328,7 @@ class _ModesInMotion:
 class ModalCasing:
     """Acceleration of the housing at the sample rate, from means of the forces over steps.
 
-    The forces come piece by piece. The acceleration is flat to :data:`PASS_BAND` of the sample
+    Forces arrive in pieces. The acceleration is flat to :data:`PASS_BAND` of the sample
     rate, with times as in :func:`decimate`.
 
     Parameters
@@ -338,18 +338,18 @@ class ModalCasing:
     step_rate : float
         Steps per second, `factor` times the sample rate.
     factor : int
-        At least 2, so that the images of the hold lie beyond the band.
+        At least 2, so that the images of the hold are outside the band.
     n_steps : int
-        Of all pieces together.
+        Total of all pieces.
 
     Notes
     -----
-    The casing runs at the step rate, before anything is decimated. Its springs and dashpots feel
-    straight lines between the means, which lose a sinc squared; they are given the means with
-    that loss made up for, so that they and the bare masses, which feel the means as they are,
-    cancel each other below the modes as they should. Each mode obeys
+    The casing runs at the step rate, before decimation. Its springs and dashpots are driven by
+    linear interpolation between the means, which attenuates by a sinc squared; the means are
+    compensated for that, so that springs and the bare masses, which are driven by the means
+    directly, cancel each other below the modes as they should. Each mode obeys
     ``q'' + 2 zeta w q' + w^2 q = sum_j phi_j F_j``, discretised exactly for a force linear between
-    samples. It starts in static balance with the first forces.
+    samples. It starts in static equilibrium with the first forces.
     """
 
     def __init__(self, modes: CasingModes, step_rate: float, factor: int, n_steps: int) -> None:
@@ -357,12 +357,12 @@ class ModalCasing:
         self._low = Decimation(modes.outputs.shape[1], n_steps, factor)
 
     def add(self, means: NDArray[np.float64]) -> None:
-        """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
+        """Add the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
         for piece in pieces(means):
             self._low.add(self._modes.add(piece))
 
     def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
-        """As :meth:`add`, of n steps, ``PIECE`` at most, that are written where they are used."""
+        """Like :meth:`add`, for at most ``PIECE`` steps, written directly into the buffer."""
         write(self._modes.room(n))
         self._low.add(self._modes.take(n))
 
@@ -373,22 +373,22 @@ class ModalCasing:
 
 
 def casing_inputs(shape: Mapping[str, float], place: str, throw: int) -> float:
-    """Mode shape where a force acts: that of the throw, else that of the place, else none.
+    """Mode shape at a force: that of its throw, else that of its place, else zero.
 
     Parameters
     ----------
     shape : mapping of str to float
-        Mass-normalised shape [kg^-0.5] by place; ``bearing_x`` is good for all throws,
-        ``bearing_x_2`` for the second alone, and wins there.
+        Mass-normalised shape [kg^-0.5] by place; ``bearing_x`` is valid for all throws,
+        ``bearing_x_2`` only for the second, where it takes precedence.
     place : str
-        Where the force acts.
+        Place of the force.
     throw : int
-        Of which throw it is, counted from 1.
+        Throw of the force, counted from 1.
 
     Returns
     -------
     float
-        [kg^-0.5]; 0 where the shape names neither.
+        Shape [kg^-0.5]; 0 if there is neither key.
 
     Examples
     --------
@@ -405,9 +405,9 @@ def casing_inputs(shape: Mapping[str, float], place: str, throw: int) -> float:
 def line_inverse() -> NDArray[np.float64]:
     """Seven symmetric taps that approximate ``1 / sinc^2`` of the frequency over the rate.
 
-    Their expansion about zero frequency agrees with that of ``(w/2)^2 / sin^2(w/2)``, which is
+    Their expansion about zero frequency equals that of ``(w/2)^2 / sin^2(w/2)``, which is
     ``1 + w^2/12 + w^4/240 + w^6/6048 + …``, to the sixth power of the angular frequency w per
-    sample: 0.4 % is left at 0.225 of the rate.
+    sample: the error is 0.4 % at 0.225 of the rate.
     """
     wanted = np.array([1.0, 1 / 12, 1 / 240, 1 / 6048])
     order = np.arange(4)

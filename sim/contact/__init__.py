@@ -1,4 +1,4 @@
-"""Contact and friction laws, and the closed forms that they are tested against.
+"""Contact and friction laws, and closed forms that verify them.
 
 It may import ``sim.jit``, ``sim.brief``.
 """

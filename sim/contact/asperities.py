@@ -1,8 +1,8 @@
-"""Rough surfaces of a pin in a close bore: the load that their peaks carry, compiled.
+"""Rough surfaces of a pin in a close bore: load on their asperities, compiled.
 
 Sources: Greenwood, Tripp (1971), Proceedings of the Institution of Mechanical Engineers 185,
 625-633, for the pressure of two rough surfaces; Hu, Cheng, Arai, Kobayashi, Aoyama (1994), J.
-Tribology 116(1), 1-8, for the power law that stands for its integral.
+Tribology 116(1), 1-8, for the power law that approximates its integral.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import Any
 from ..jit import kernel
 
 SEPARATION = 4.0
-"""Gap over the roughness from which on no peaks touch."""
+"""Gap over the roughness above which no asperities touch."""
 
 _POWER = 6.804  # of the pressure
 _FACTOR = 4.4086e-5  # of the pressure
@@ -28,17 +28,17 @@ def asperity_scale(
     roughness : float
         Root of the sum of both surfaces' mean square roughness [m].
     radius, length, clearance : float
-        Of the pin; clearance radial [m].
+        Dimensions of the pin; clearance radial [m].
     stiffness : float
         Pressure ``16 sqrt(2) pi / 15 (s b n)^2 sqrt(s / b) E*`` of the pair, with roughness s,
-        radius b and density n of the peaks [Pa]; about 0.003 times E*.
+        radius b and density n of the asperities [Pa]; about 0.003 times E*.
 
     Notes
     -----
     The pressure is ``stiffness F(h / s)`` with ``F(u) = 4.4086e-5 (4 - u)^6.804``. Near the least
-    gap g the film is ``h = g + c t^2 / 2`` thick, so that the force per length is the integral of
-    a power over a parabola, Euler's beta function. Good while the peaks touch over less than half
-    a radian: ``8 s << c``.
+    gap g the gap is ``h = g + c t^2 / 2`` thick, so that the force per length is the integral of
+    a power over a parabola, Euler's beta function. Valid if the asperities touch over less than
+    half a radian: ``8 s << c``.
 
     Examples
     --------
@@ -51,19 +51,19 @@ def asperity_scale(
 
 @kernel
 def asperity_force(gap: float, roughness: float, scale: float) -> Any:
-    """Force that the peaks carry, and minus its derivative by the gap.
+    """Force of the asperities, and minus its derivative by the gap.
 
     Parameters
     ----------
     gap : float
-        Least gap between the mean surfaces [m]; negative where they overlap.
+        Least gap between the mean surfaces [m]; negative for an overlap.
     roughness, scale : float
         See :func:`asperity_scale` [m], [N].
 
     Returns
     -------
     tuple of float
-        [N], [N/m]; zeros from four roughnesses on.
+        Force [N], derivative [N/m]; zeros from four roughnesses on.
     """
     if roughness <= 0.0 or gap >= SEPARATION * roughness:
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Closed forms that the solvers are tested against, and that the cheapest rungs are made of."""
+"""Closed forms that verify the solvers and serve as the cheapest rungs."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from ..brief import brief
 class IdealCrank:
     """Motion and forces of a slider-crank without clearance at constant speed.
 
-    All arrays have the shape of the crank angle given. x runs along the stroke from the crank
+    All arrays have the shape of the given crank angle. x runs along the stroke from the crank
     centre to the piston, y across it; the rod's crank-pin end is at ``y = L2 sin(beta)``.
 
     Attributes
@@ -71,13 +71,13 @@ def ideal_crank(
     speed : float
         Crank speed [rad/s].
     crank_radius, rod_length : float
-        Between the centres of the joints [m].
+        Lengths between the centres of the joints [m].
     rod_mass : float
-        Of the whole rod [kg].
+        Mass of the whole rod [kg].
     rod_centre : float
         Distance of the rod's centre of mass from the wrist pin [m].
     rod_inertia : float
-        About the centre of mass [kg m^2].
+        Inertia about the centre of mass [kg m^2].
     piston_mass : float
         Piston with crosshead and wrist pin [kg].
     piston_force : numpy.ndarray or float
@@ -146,7 +146,7 @@ def kelvin_voigt_restitution(damping_ratio: float, *, release_at_zero_force: boo
         ``C / (2 sqrt(K m))``, 0 <= zeta < 1.
     release_at_zero_force : bool
         True: the contact opens when its force reaches zero, so it never pulls. False: it opens
-        when the penetration is back at zero, pulling shortly before.
+        when the penetration returns to zero, and pulls shortly before.
 
     Returns
     -------
@@ -223,7 +223,7 @@ def hertz_sphere_stiffness(modulus: float, radius: float, seat_radius: float) ->
     modulus : float
         E* of the pair, see :func:`effective_modulus` [Pa], > 0.
     radius, seat_radius : float
-        Of the ball, and of the hollow around it, larger [m].
+        Radius of the ball, and the larger one of the hollow around it [m].
 
     Returns
     -------
@@ -238,9 +238,9 @@ def hertz_sphere_stiffness(modulus: float, radius: float, seat_radius: float) ->
     Notes
     -----
     ``K = 4/3 E* sqrt(R_1 R_2 / (R_2 - R_1))`` (Hertz 1882; Johnson, Contact Mechanics, 1985,
-    sec. 4.2). It holds while the contact is small beside the radii. The literature of clearance
-    joints takes it for a pin in an eye too (Ravn 1998), where it is a convention: their contact
-    is a line, and the nearer the radii the worse. :func:`conformal_stiffness` is for these.
+    sec. 4.2), for a contact that is small compared with the radii. The literature on clearance
+    joints uses it by convention for a pin in an eye too (Ravn 1998). But there the contact is a
+    line, and the error grows as the radii approach each other: use :func:`conformal_stiffness`.
 
     Examples
     --------
@@ -253,7 +253,7 @@ def hertz_sphere_stiffness(modulus: float, radius: float, seat_radius: float) ->
     if not 0 < radius < seat_radius:
         raise ValueError(
             f"radius = {radius} m must be > 0 and < seat_radius = {seat_radius} m; "
-            "check which is the hollow one"
+            "check which one is hollow"
         )
     return 4 / 3 * modulus * math.sqrt(radius * seat_radius / (seat_radius - radius))
 
@@ -266,7 +266,7 @@ def conformal_stiffness(modulus: float, length: float) -> float:
     modulus : float
         E* of the pair, see :func:`effective_modulus` [Pa], > 0.
     length : float
-        Of the contact along the pin's axis [m], > 0.
+        Length of the contact along the pin's axis [m], > 0.
 
     Returns
     -------
@@ -280,7 +280,7 @@ def conformal_stiffness(modulus: float, length: float) -> float:
 
     Notes
     -----
-    ``K = pi/2 E* L``: a foundation whose pressure falls off over the arc of contact (Liu, Zhang,
+    ``K = pi/2 E* L``: a foundation whose pressure decreases over the arc of contact (Liu, Zhang,
     Yang 2007, Mechanism and Machine Theory 42(2), 183-197). Plane strain, no friction. For d well
     above c the force becomes linear, ``K d / sqrt(2)``.
 
@@ -318,7 +318,7 @@ def sommerfeld_film(eccentricity_ratio: float) -> float:
 
     Notes
     -----
-    Negative pressure is kept, as in a bearing that is flooded under high ambient pressure.
+    Negative pressure is kept, as in a flooded bearing under high ambient pressure.
 
     References
     ----------
@@ -381,7 +381,7 @@ def ocvirk_film(eccentricity_ratio: float, length_to_diameter: float) -> tuple[f
 def _eccentricity_ratio(value: float) -> float:
     if not 0 < value < 1:
         raise ValueError(
-            f"eccentricity_ratio = {value} must be in (0, 1); at 0 the film carries nothing, "
+            f"eccentricity_ratio = {value} must be in (0, 1); at 0 the film has no load, "
             "at 1 the journal touches"
         )
     return value

@@ -6,9 +6,9 @@ pin's, the tangential one along the sliding velocity of the pin over the eye.
 
 The hysteresis laws share one form, ``F = F_e(d) (1 + a d' / d'_0)``, with F_e the elastic force, d
 the penetration, d'_0 the speed at first touch and a the hysteresis factor. They differ in how a
-follows from the restitution e that is asked for, and most of them miss it. Whatever the
-elasticity, the mass and the speed (:func:`effective_restitution` says why), a body that is asked
-to return with e returns with
+follows from the required restitution e, and most of them miss it. For any elasticity, mass and
+speed (:func:`effective_restitution` shows why), a required restitution e
+results in
 
     ======================= ===== ===== ===== ===== =====
     e                         0.3   0.5   0.7   0.8   0.9
@@ -25,8 +25,8 @@ to return with e returns with
     ``lee-wang``            0.739 0.799 0.869 0.909 0.952
     ======================= ===== ===== ===== ===== =====
 
-All of them take the bodies as elastic but for the loss itself: an impact faster than about
-``1e-5 sqrt(E / rho)`` (Love; 5 cm/s for steel) leaves a mark.
+All of them assume elastic bodies except for the loss itself: an impact faster than about
+``1e-5 sqrt(E / rho)`` (Love; 5 cm/s for steel) leaves a permanent mark.
 """
 
 import math
@@ -58,13 +58,13 @@ CONTACT = np.dtype(
         ("stiffness", np.float64),  # K of the elasticity: [N/m], Hertz [N/m^1.5]
         ("damping", np.float64),  # C of Kelvin-Voigt [N s/m]
         ("hysteresis", np.float64),  # a of the hysteresis laws
-        ("clearance", np.float64),  # radial [m]; of a worn eye across the rod
-        ("slot", np.float64),  # by which an eye is longer along its rod than across [m]
+        ("clearance", np.float64),  # radial [m]; for a worn eye across the rod
+        ("slot", np.float64),  # length of an eye along its rod in excess of that across [m]
         ("speed_floor", np.float64),  # least d'_0, or the constant one, > 0 [m/s]
         ("release", np.int64),  # RELEASE_*
         ("friction_law", np.int64),  # FRICTION_*
         ("friction", np.float64),  # Coulomb's coefficient
-        ("friction_speed", np.float64),  # full friction from about here on, > 0 [m/s]
+        ("friction_speed", np.float64),  # speed of nearly full friction, > 0 [m/s]
         ("friction_dead_speed", np.float64),  # no friction below, FRICTION_RAMP [m/s]
         ("tangential_damping", np.float64),  # C_t [N s/m]
     ]
@@ -72,9 +72,9 @@ CONTACT = np.dtype(
 """One record per joint; SI, codes as integers."""
 
 _LEAST_CARVALHO_MARTINS = 1 / 3  # validity given with the formula
-_ASYMPTOTE = 0.05  # coth x = 1 to rounding where 1 - L(x) is below it, that is x > 20
-_SERIES_END = 0.1  # below, coth x - 1/x cancels more than the series leaves out (6e-16)
-_NEWTON_STEPS = 50  # both uses settle within 8
+_ASYMPTOTE = 0.05  # coth x = 1 to rounding if 1 - L(x) is below it, that is x > 20
+_SERIES_END = 0.1  # below, cancellation in coth x - 1/x exceeds the series' error (6e-16)
+_NEWTON_STEPS = 50  # both uses converge within 8
 
 
 # --- normal force
@@ -86,8 +86,8 @@ def elastic_force(penetration: float, contact: Any) -> float:
 
     Linear ``K d``; Hertz ``K d^(3/2)`` (:func:`.contact.closed_forms.hertz_sphere_stiffness`);
     conformal cylinders ``K d sqrt(d / (2 (c + d)))`` with c the radial clearance
-    (:func:`.contact.closed_forms.conformal_stiffness`), which passes from d^(3/2) to linear as the
-    pin sinks in beyond the clearance.
+    (:func:`.contact.closed_forms.conformal_stiffness`), which changes from d^(3/2) to linear as the
+    penetration exceeds the clearance.
 
     References
     ----------
@@ -124,13 +124,13 @@ def normal_force(
 
     Kelvin-Voigt: ``F_e(d) + C d'``, a spring and a dashpot in parallel (eq. 12 of Xia et al. 2017,
     the pump paper). The dashpot makes the force jump at first touch and turn negative before the
-    surfaces part, so the sign is kept, and without penetration ``K d + C d'``: the solver finds
-    opening and closing where it changes. `impact_speed` does not matter.
+    surfaces part; the sign is kept, and without penetration the force is ``K d + C d'``: the solver
+    locates opening and closing by its sign changes. `impact_speed` is ignored.
 
     Hysteresis: ``max(0, F_e(d) (1 + a d' / d'_0))``, continuous at first touch and at release, both
-    at zero penetration. It never pulls; a free impact does not come to the limit, as it leaves
-    slower than ``d'_0 / a``. d'_0 is `impact_speed`, at least the record's `speed_floor`
-    (:func:`floored_restitution` gives the price). With a constant loss d'_0 is `speed_floor` for
+    at zero penetration. It never pulls; a free impact does not reach that limit, as it separates
+    more slowly than ``d'_0 / a``. d'_0 is `impact_speed`, at least the record's `speed_floor`
+    (:func:`floored_restitution` gives the error). With a constant loss d'_0 is `speed_floor` for
     every impact, so that faster ones lose more, as Hunt and Crossley (1975) found.
 
     Parameters
@@ -138,9 +138,9 @@ def normal_force(
     penetration : float
         d [m], negative while the surfaces are apart.
     approach_speed : float
-        Its rate d' [m/s].
+        Rate d' of the penetration [m/s].
     impact_speed : float
-        Approach speed at the touch that began this contact [m/s].
+        Approach speed at the first touch of this contact [m/s].
     contact : record of CONTACT
     """
     elastic = elastic_force(penetration, contact)
@@ -161,7 +161,7 @@ def normal_force(
 
 @kernel
 def _ramp_parts(speed: float, dead_speed: float, full_speed: float) -> Any:
-    """Numerator and denominator of a sign that rises in proportion between two speeds.
+    """Numerator and denominator of a sign that rises linearly between two speeds.
 
     Zero up to the dead speed, one from the full one on.
 
@@ -180,15 +180,15 @@ def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> f
     """Regularised Coulomb friction plus the pump paper's viscous term ``C_t v`` [N].
 
     Coulomb's part is ``f N s(v)`` with s the regularised sign ``v / sqrt(v^2 + v_s^2)`` at the
-    `friction_speed` v_s, 0.995 at ten times that, or one that rises in proportion from
-    `friction_dead_speed` to `friction_speed`; a contact that pulls has none. The force has the
-    sign of the sliding velocity, so on the body that slides, where it acts in the opposite sense,
-    it never adds energy. At rest there is no friction: a constant load creeps.
+    `friction_speed` v_s, 0.995 at ten times that, or one that rises linearly from
+    `friction_dead_speed` to `friction_speed`; a contact that pulls has no friction. The force has
+    the sign of the sliding velocity; it acts on the sliding body in the opposite direction, so
+    it never adds energy. There is no static friction: a constant load creeps.
     """
     full, smooth = contact.friction_speed, contact.friction_law == FRICTION_SMOOTH
     part, whole = _ramp_parts(sliding_speed, contact.friction_dead_speed, full)
     rounded = math.sqrt(sliding_speed * sliding_speed + full * full)
-    # one division for either law: it takes longer than all else here
+    # one division for either law: it takes longer than everything else here
     sign = (sliding_speed if smooth else part) / (rounded if smooth else whole)
     coulomb = contact.friction * max(0.0, normal_force) * sign
     force: float = coulomb + contact.tangential_damping * sliding_speed
@@ -199,15 +199,15 @@ def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> f
 
 
 def hysteresis(law: str, restitution: float) -> float:
-    """Hysteresis factor by which a law means to give a restitution.
+    """Hysteresis factor of a law for a required restitution.
 
     Parameters
     ----------
     law : str
         One of :data:`HYSTERESIS`.
     restitution : float
-        Speed of separation over speed of approach that is asked for, 0 < e <= 1;
-        ``carvalho-martins`` holds from 1/3 on.
+        Required speed of separation over speed of approach, 0 < e <= 1;
+        ``carvalho-martins`` is valid from 1/3 on.
 
     Returns
     -------
@@ -221,9 +221,9 @@ def hysteresis(law: str, restitution: float) -> float:
 
     Notes
     -----
-    Only ``exact`` and, within 0.003, ``carvalho-martins`` give what is asked for; the table at the
-    head of this file shows the others. ``hunt-crossley`` stays within 5 % from e = 0.78 on,
-    ``lankarani-nikravesh`` from 0.82. For little damping a must tend to ``3/2 (1 - e)``:
+    Only ``exact`` and, within 0.003, ``carvalho-martins`` achieve the required value; the table at
+    the head of this file shows the others. ``hunt-crossley`` is within 5 % from e = 0.78 on,
+    ``lankarani-nikravesh`` from 0.82. For small damping a must tend to ``3/2 (1 - e)``:
     ``lee-wang`` tends to half of it, ``gonthier`` to 4/3 and ``flores`` to 16/15 of it.
 
     References
@@ -264,7 +264,7 @@ def hysteresis(law: str, restitution: float) -> float:
 
 
 def effective_restitution(factor: float) -> float:
-    """Coefficient of restitution that a hysteresis factor gives to a free impact.
+    """Coefficient of restitution of a free impact with a hysteresis factor.
 
     Parameters
     ----------
@@ -284,16 +284,16 @@ def effective_restitution(factor: float) -> float:
     Notes
     -----
     With ``v = d' / d'_0`` the motion ``m d'_0^2 v dv = -F_e(d) (1 + a v) dd`` separates: the
-    integral of ``v / (1 + a v)`` by v is the elastic energy passed through, over ``m d'_0^2``.
-    Closing (v from 1 to 0) and opening (v from 0 to -e) pass through the same energy, whatever
-    F_e, so it drops out:
+    integral of ``v / (1 + a v)`` by v is the elastic energy, over ``m d'_0^2``.
+    Closing (v from 1 to 0) and opening (v from 0 to -e) pass through the same energy, for any
+    F_e, so it cancels:
 
         a (1 + e) = ln((1 + a) / (1 - a e)).
 
     With ``2 x = a (1 + e)`` this becomes ``(1 - e) / (1 + e) = coth x - 1/x``, Langevin's function
-    L: hence ``a = x (1 + L)`` to be solved for x, and ``e = (1 - L) / (1 + L)``. No root finding
-    in e, and no cancellation at either end. Small factors: ``e = 1 - 2 a / 3 + ...``; large ones:
-    ``e = 1 / a``. Nothing else may act on the body during the impact.
+    L: hence solve ``a = x (1 + L)`` for x, and ``e = (1 - L) / (1 + L)``. This avoids root finding
+    in e, and cancellation at either end. Small factors: ``e = 1 - 2 a / 3 + ...``; large ones:
+    ``e = 1 / a``. No other force may act on the body during the impact.
 
     Examples
     --------
@@ -317,10 +317,10 @@ def effective_restitution(factor: float) -> float:
 
 
 def floored_restitution(factor: float, impact_speed: float, speed_floor: float) -> float:
-    """Coefficient of restitution of an impact under a floor of the impact speed.
+    """Coefficient of restitution of an impact with a floor of the impact speed.
 
-    The hysteresis laws divide by the impact speed, which goes to zero where a contact closes
-    gently or is sustained. The floor bounds that: a slower impact feels the factor
+    The hysteresis laws divide by the impact speed, which tends to zero for a contact that closes
+    gently or is sustained. The floor bounds that: a slower impact has the factor
     ``a d'_0 / floor`` and so loses less than it should, in the limit nothing.
 
     Parameters
@@ -357,7 +357,7 @@ def floored_restitution(factor: float, impact_speed: float, speed_floor: float) 
 def _exact(restitution: float) -> float:
     """Factor that gives the restitution: ``a = 2 x / (1 + e)`` with ``L(x) = (1 - e) / (1 + e)``.
 
-    Newton from Cohen's approximation of the inverse of L, which is within 5 % everywhere.
+    Newton's method from Cohen's approximation of the inverse of L, which is within 5 % everywhere.
     """
     lost = (1 - restitution) / (1 + restitution)
     kept = 2 * restitution / (1 + restitution)  # 1 - lost, without cancellation
@@ -395,7 +395,7 @@ HYSTERESIS: dict[str, Callable[[float], float]] = {
     "lankarani-nikravesh": lambda e: 0.75 * (1 - e * e),
     "lee-wang": lambda e: 0.75 * (1 - e),
 }
-"""Name of a hysteresis law -> its factor by the restitution asked for.
+"""Name of a hysteresis law -> its factor as a function of the required restitution.
 
-Formulae alone; :func:`hysteresis` checks the range.
+Formulas only; :func:`hysteresis` checks the range.
 """

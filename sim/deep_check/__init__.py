@@ -1,4 +1,4 @@
-"""Figures of a scene, a short run included, beside what is usual of such machines.
+"""Figures of a scene, including a short run, compared with usual values of such machines.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.film``, ``sim.bearing``,
 ``sim.beam``, ``sim.alignment``, ``sim.mechanism``, ``sim.pump_setup``, ``sim.pump``,

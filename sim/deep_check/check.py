@@ -1,4 +1,4 @@
-"""Deep check of any scene: every figure of its machine beside what is usual, a short run too."""
+"""Deep check of any scene: figures of its machine and a short run, compared with usual values."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from .shaft import SHAFT_ROWS, shaft_facts
 
 @dataclass(frozen=True, kw_only=True)
 class DeepCheck:
-    """What a deep check has found.
+    """Result of a deep check.
 
     Attributes
     ----------
     figures : tuple of Figure
         In the order of the machine's table.
     failure : str
-        Why the short run failed, with the cure; "" where it did not.
+        Why the short run failed, with the cure; "" if it did not.
     warnings : tuple of str
-        Of the scene and of its run, those that no figure tells already.
+        Warnings of the scene and its run that no figure covers.
     turns : float
-        Revolutions that were run.
+        Revolutions of the run.
     """
 
     figures: tuple[Figure, ...]
@@ -39,7 +39,7 @@ class DeepCheck:
 
     @property
     def unusual(self) -> tuple[Figure, ...]:
-        """Figures outside of what is usual."""
+        """Figures outside of the usual range."""
         return tuple(figure for figure in self.figures if not figure.usual)
 
 
@@ -48,17 +48,17 @@ _TABLES: dict[type[Scene], tuple[Callable[[Any], Any], Sequence[Quantity]]] = {
     JournalScene: (journal_facts, JOURNAL_ROWS),
     ShaftScene: (shaft_facts, SHAFT_ROWS),
 }
-"""Facts and table of every machine with figures of its own."""
+"""Facts and table of every machine with its own figures."""
 
 
 def deep_check(scene: Scene) -> DeepCheck:
-    """Every figure of a scene beside what is usual.
+    """Compare all figures of a scene with usual values.
 
     Parameters
     ----------
     scene : Scene
-        Without faults, see :func:`wearstate.sim.machine.simulate.check`. Its rungs are taken as
-        written, also where its fidelity is "auto".
+        A valid scene, see :func:`wearstate.sim.machine.simulate.check`. Its rungs are used as
+        written, also with fidelity "auto".
 
     Returns
     -------
@@ -74,18 +74,18 @@ def deep_check(scene: Scene) -> DeepCheck:
     gather, table = _TABLES.get(type(scene), (plain_facts, RECORDING))
     facts = gather(scene)
     rows = figures(table, facts)
-    told = {row.quantity.doubt for row in rows if row.quantity.doubt and not row.usual}
+    covered = {row.quantity.doubt for row in rows if row.quantity.doubt and not row.usual}
     all_doubts: tuple[Doubt, ...] = (*scene_doubts(scene), *facts.trial.doubts)
-    doubts = [doubt for doubt in all_doubts if doubt.check not in told]
+    doubts = [doubt for doubt in all_doubts if doubt.check not in covered]
     status = facts.trial.solution.status
     return DeepCheck(
         figures=rows,
         failure="" if status.ok else f"{status.name.lower()}: {status.text}",
-        warnings=(*(doubt.text for doubt in doubts), *_untold(facts.trial.warnings, told)),
+        warnings=(*(doubt.text for doubt in doubts), *_uncovered(facts.trial.warnings, covered)),
         turns=facts.trial.scene.duration * facts.trial.scene.drive.speed,
     )
 
 
-def _untold(warnings: Sequence[str], told: Collection[str]) -> list[str]:
-    """Warnings of a run that no unusual figure tells already."""
-    return [text for text in warnings if not any(words in text for words in told)]
+def _uncovered(warnings: Sequence[str], covered: Collection[str]) -> list[str]:
+    """Warnings of a run that no unusual figure covers."""
+    return [text for text in warnings if not any(words in text for words in covered)]

@@ -1,4 +1,4 @@
-"""Deep check of a journal bearing: its figures beside what is usual."""
+"""Deep check of a journal bearing: its figures compared with usual values."""
 
 import math
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from ..journal.recording import film_geometry, journal_scale
 from ..scene.journal import JournalScene
 from .rows import OIL_DENSITY, RECORDING, Quantity, ShortRun, taylor_share, trial
 
-_SECONDS = 3.0  # tabulated, of the trial; a map's run costs a hundredth of it
-_HEAT = 1.7e6  # J/(m^3 K), of mineral oil
+_SECONDS = 3.0  # tabulated time of the trial; a map's run costs a hundredth of it
+_HEAT = 1.7e6  # J/(m^3 K), mineral oil
 
 
 @dataclass(frozen=True, kw_only=True)
 class JournalFacts:
-    """A journal bearing, where it rests, and a run of it.
+    """A journal bearing, its equilibrium, and a run of it.
 
     Attributes
     ----------
     scene : JournalScene
     trial : Trial
     rest : Equilibrium or None
-        Under weight and static load; None where there is no load, or no film that carries it.
+        Under weight and static load; None without load, or if no film can carry it.
     """
 
     scene: JournalScene
@@ -48,7 +48,7 @@ def steady_load(scene: JournalScene) -> tuple[float, float]:
 
 
 def journal_facts(scene: JournalScene) -> JournalFacts:
-    """Run a journal bearing, as long as it is cheap, and let it rest under its steady load."""
+    """Run a journal bearing while that is cheap, and find its equilibrium at its steady load."""
     whole = scene.duration * scene.drive.speed
     return JournalFacts(
         scene=scene, trial=trial(scene, turns=whole, seconds=_SECONDS), rest=_rest(scene)
@@ -71,7 +71,7 @@ def _radial(scene: JournalScene) -> float:
     return scene.bearing.clearance_radial
 
 
-# --- what carries
+# --- load capacity
 
 
 def _surface(facts: JournalFacts) -> dict[str, float]:
@@ -131,7 +131,7 @@ def _peak_pressure(facts: JournalFacts) -> dict[str, float]:
     return {} if found is None else {"": 1e-6 * float(found.max())}
 
 
-# --- what the film assumes
+# --- assumptions of the film
 
 
 def _taylor(facts: JournalFacts) -> dict[str, float]:
@@ -148,7 +148,7 @@ def _taylor(facts: JournalFacts) -> dict[str, float]:
 
 
 def _warming(facts: JournalFacts) -> dict[str, float]:
-    """All friction into the oil that leaves at both ends [K]."""
+    """Temperature rise if all friction heats the oil leaving at both ends [K]."""
     if facts.rest is None:
         return {}
     scene, scale = facts.scene, journal_scale(facts.scene)
@@ -159,7 +159,7 @@ def _warming(facts: JournalFacts) -> dict[str, float]:
 
 
 def _cells(facts: JournalFacts) -> dict[str, float]:
-    """Nodes where the gap is below twice its least: all round while it never is."""
+    """Nodes where the gap is below twice its least; all nodes at low eccentricity."""
     scene, numerics = facts.scene, facts.trial.solution.numerics
     peak = float(numerics.get("peak_eccentricity", math.nan))
     if scene.film.rung == "short" or not 0 < peak < 1:
@@ -168,19 +168,19 @@ def _cells(facts: JournalFacts) -> dict[str, float]:
 
 
 def thin_nodes(eccentricity: float, n_theta: int) -> float:
-    """Nodes of a mesh over the arc on which the gap is below twice its least.
+    """Number of nodes where the gap is below twice its least.
 
     Parameters
     ----------
     eccentricity : float
-        Ratio, in (0, 1).
+        Eccentricity ratio, in (0, 1).
     n_theta : int
         Nodes round the circle.
 
     Returns
     -------
     float
-        ``n / pi arccos((2 e - 1) / e)``, all of them up to e = 1/3.
+        ``n / pi arccos((2 e - 1) / e)``; all nodes up to e = 1/3.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def thin_nodes(eccentricity: float, n_theta: int) -> float:
     return n_theta / math.pi * math.acos(max(-1.0, (2 * eccentricity - 1) / eccentricity))
 
 
-# --- what excites it
+# --- excitation
 
 
 def _balance(facts: JournalFacts) -> dict[str, float]:
@@ -201,7 +201,7 @@ def _balance(facts: JournalFacts) -> dict[str, float]:
 
 
 def _whirl(facts: JournalFacts) -> dict[str, float]:
-    """Mass on the bearing over that at which the film begins to whirl, by Routh and Hurwitz."""
+    """Mass on the bearing over the mass at the whirl threshold, by Routh and Hurwitz."""
     if facts.rest is None:
         return {}
     load = float(np.hypot(*facts.rest.load))
@@ -256,7 +256,7 @@ JOURNAL_ROWS = (
         measure=_pressure,
         least=0.05,
         most=7.0,
-        reason="0.2 to 3 of machines, white metal bears 5 to 7",
+        reason="0.2 to 3 in machines, white metal bears 5 to 7",
         low="check rotor.mass and load.static: so light a bearing is close to whirling",
         high="raise bearing.length or diameter, or lower load.static",
     ),
@@ -310,14 +310,14 @@ JOURNAL_ROWS = (
         measure=_taylor,
         most=1.0,
         reason="all rungs are laminar: below 41.2 sqrt(R / C) (Taylor)",
-        high="raise oil.viscosity, or lower clearance or drive.speed: no rung knows turbulence",
+        high="raise oil.viscosity, or lower clearance or drive.speed: no rung models turbulence",
     ),
     Quantity(
         name="warming of the oil, at most",
         unit="K",
         measure=_warming,
         most=80.0,
-        reason="all rungs are isothermal; no heat to shell and shaft, no feed pressure here",
+        reason="all rungs are isothermal; heat to shell and shaft and feed pressure are neglected",
         high="give oil.viscosity at the film's mean temperature, or raise the clearance",
     ),
     Quantity(
@@ -333,7 +333,7 @@ JOURNAL_ROWS = (
         unit="",
         measure=lambda facts: _slenderness(facts) if facts.scene.film.rung == "short" else {},
         most=0.5,
-        reason="the short bearing knows no flow round the circle",
+        reason="the short bearing neglects flow round the circle",
         high="set film.rung = 'map'",
     ),
     Quantity(
@@ -356,4 +356,4 @@ JOURNAL_ROWS = (
     ),
     *RECORDING,
 )
-"""Every figure of a journal bearing. A new one is one function and one row."""
+"""All figures of a journal bearing. A new one is one function and one row."""

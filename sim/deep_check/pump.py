@@ -35,7 +35,7 @@ PUMP_ROWS = (
         measure=running(piston_speed),
         least=0.1,
         most=2.0,
-        reason="0.3 to 1.5 of plunger and mud pumps",
+        reason="0.3 to 1.5 in plunger and mud pumps",
         low="check drive.speed (rpm or rev/s) and crank.radius (half the stroke)",
         high="lower drive.speed (rpm or rev/s?) or crank.radius (half the stroke, not all of it)",
     ),
@@ -104,7 +104,7 @@ PUMP_ROWS = (
         measure=running(rubbing),
         least=0.05,
         most=8.0,
-        reason="0.5 to 3 of pumps, engines to 10",
+        reason="0.5 to 3 in pumps, engines to 10",
         low="check drive.speed and joint.crankpin.pin_diameter",
         high="lower drive.speed or joint.crankpin.pin_diameter",
     ),
@@ -131,7 +131,7 @@ PUMP_ROWS = (
         unit="steps per period",
         measure=contact_steps,
         least=12.0,
-        reason="21 by default; at 12 a contact turns too slowly by 6e-4",
+        reason="21 by default; at 12 a contact's phase is low by 6e-4",
         low="shorten numerics.step, or leave it out",
     ),
     Quantity(
@@ -140,7 +140,7 @@ PUMP_ROWS = (
         measure=sunk,
         least=1e-3,
         most=2.0,
-        reason="under the load without clearance; from 4 on the gap makes no difference",
+        reason="under the load without clearance; from 4 on the gap has no effect",
         low="lower the joint's stiffness: oil film, bush and web in series give 100 to 5000 MN/m",
         high="raise the joint's stiffness (100 to 5000 MN/m), or set its rung to 'ideal'",
     ),
@@ -159,7 +159,7 @@ PUMP_ROWS = (
         least=0.5,
         most=20.0,
         reason="two load reversals, each with bounces; those above a tenth of the hardest count",
-        low="no reversal, no knock: rung 'link' says as much for less; or check the suction",
+        low="no reversal, no knock: rung 'link' gives the same at less cost; or check the suction",
         high="raise damping of the contact, or lower its clearance: it rattles",
     ),
     Quantity(
@@ -188,7 +188,7 @@ PUMP_ROWS = (
         least=5.0,
         reason="5 to 30 and more; lightest casing mode over all pistons and rods",
         low="lower the shapes of casing.modes: near 1 over the square root of the mass that moves; "
-        "a casing that light gives way to knocks: casing.rung = 'yielding'",
+        "a casing that light yields to knocks: casing.rung = 'yielding'",
         doubt="light casing",
     ),
     Quantity(
@@ -196,7 +196,7 @@ PUMP_ROWS = (
         unit="",
         measure=bearing_mass,
         least=1.0,
-        reason="2 to 100; below 40 one that yields is quieter than one at rest, by decibels",
+        reason="2 to 100; below 40 a yielding one is quieter than one at rest, by decibels",
         low="lower the shapes of casing.modes at bearing_x and bearing_y",
     ),
     Quantity(
@@ -233,7 +233,7 @@ PUMP_ROWS = (
         unit="",
         measure=running(first_mode),
         least=3.0,
-        reason="10 to 50 bolted down; below 3 it meets the large first orders",
+        reason="10 to 50 bolted down; below 3 it coincides with the large first orders",
         low="raise the lowest frequency of casing.modes (Hz, not rpm), or lower drive.speed",
     ),
     Quantity(
@@ -241,7 +241,7 @@ PUMP_ROWS = (
         unit="",
         measure=band,
         most=1.0,
-        reason="a mode above moves nothing that is recorded",
+        reason="a mode above is not recorded",
         high="raise sample_rate, leave that mode out, or check its unit",
         doubt="modes outside",
     ),
@@ -251,10 +251,10 @@ PUMP_ROWS = (
         measure=casing_damping,
         least=0.2,
         most=12.0,
-        reason="0.5 to 5 of bolted iron, more on rubber",
+        reason="0.5 to 5 for bolted iron, more on rubber",
         low="raise the mode's damping_ratio: 0.02, not 2e-4",
         high="lower the mode's damping_ratio: 0.02, not 2",
     ),
     *RECORDING,
 )
-"""Every figure of a pump. A new one is one function and one row."""
+"""All figures of a pump. A new one is one function and one row."""

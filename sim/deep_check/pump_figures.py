@@ -21,9 +21,9 @@ from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE
 from .rows import ShortRun, trial
 
 _JOINTS = ("crankpin", "wristpin", "guide")
-_TURNS = 6.0  # of the trial: after settling every revolution is much like the last
-_SECONDS = 4.0  # tabulated, of the trial
-_HARD = 0.1  # of the hardest impact of a run: what is slower is a bounce that dies down
+_TURNS = 6.0  # of the trial: after settling, revolutions are similar
+_SECONDS = 4.0  # tabulated time of the trial
+_HARD = 0.1  # of the hardest impact of a run: slower ones are decaying bounces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class PumpFacts:
 
 
 def pump_facts(scene: PumpScene) -> PumpFacts:
-    """Run six revolutions of a pump; of one that stands, its test as written."""
+    """Run six revolutions of a pump; for one at rest, its test as written."""
     turns = _TURNS if scene.running else scene.duration * scene.drive.speed
     return PumpFacts(
         scene=scene,
@@ -211,22 +211,22 @@ def tension(facts: PumpFacts) -> dict[str, float]:
 def closing_speeds(
     offset: NDArray[np.float64], clearance: float, sample_rate: float
 ) -> NDArray[np.float64]:
-    """Speeds at which a pin meets its eye.
+    """Impact speeds of a pin in its eye.
 
     Parameters
     ----------
     offset : numpy.ndarray [shape=(n, 2)]
-        Of the pin's centre from the eye's [m].
+        Position of the pin's centre from the eye's [m].
     clearance : float
-        Radial [m].
+        Radial clearance [m].
     sample_rate : float
-        [Hz]
+        Sampling rate [Hz].
 
     Returns
     -------
     numpy.ndarray [shape=(n_impacts,)]
-        Radial, over the last sample before contact and the first in it: somewhat low of a contact
-        that is stiff at this rate [m/s].
+        Radial, over the last sample before contact and the first in it [m/s]: slightly low for a
+        contact that is stiff at this rate.
 
     Examples
     --------
@@ -237,7 +237,7 @@ def closing_speeds(
     radius = np.hypot(*offset.T)
     inside = radius > clearance
     first = np.flatnonzero(~inside[:-1] & inside[1:]) + 1
-    before = first[first >= 2]  # flight before contact has no elastic part in it
+    before = first[first >= 2]  # flight before contact has no elastic part
     flown = np.maximum(radius[before - 1] - radius[before - 2], radius[before] - radius[before - 1])
     return np.asarray(sample_rate * flown)
 

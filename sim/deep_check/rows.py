@@ -1,8 +1,8 @@
-"""Figures of a scene beside what is usual: the rows of a deep check, and what all machines share.
+"""Figures of a scene compared with usual values: rows of a deep check, common to all machines.
 
-A quantity is one row: how it is found, in which range machines have it, why, and the cure outside.
-"Usual" is our judgement of what machines have, wider than a designer would choose; no standard is
-quoted for it but where a row names one. It is no bound of validity: those are checked before, by
+A quantity is one row: its measure, the usual range in machines, the reason, and the cure outside.
+"Usual" is our judgement of what machines have, wider than a designer would choose; a standard is
+quoted only where a row names one. It is no limit of validity: those are checked before, by
 :func:`wearstate.sim.machine.simulate.check`.
 """
 
@@ -27,10 +27,10 @@ from ..scene.plausibility import (
 from ..scene.rungs import with_values
 from ..scene.scene import Scene, channels_of
 
-_BYTES = 4  # of a sample: float32
-_TURNS = 6.0  # of a plain run
-_SECONDS = 4.0  # tabulated, of a plain run
-_ROUNDING = 1e-6  # of a bound that a value stands on
+_BYTES = 4  # per sample: float32
+_TURNS = 6.0  # of a run without own figures
+_SECONDS = 4.0  # tabulated time of a run without own figures
+_ROUNDING = 1e-6  # tolerance for a value on a bound
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,19 +40,19 @@ class Quantity:
     Attributes
     ----------
     name, unit : str
-        As shown; the unit is that of `measure`, for people.
+        For display; the unit is that of `measure`.
     measure : callable
-        Facts of a scene -> place -> value. Empty where the scene has no such thing; of several
-        places the one furthest from usual is shown. A machine with one place names it "".
+        Facts of a scene -> place -> value. Empty if the scene does not have it; of several
+        places the most unusual one is shown. A machine with one place names it "".
     least, most : float
-        Usual values; infinite where there is no such end.
+        Usual range; infinite without a limit.
     reason : str
-        Why they are usual; the source where there is one.
+        Why it is usual, with the source if there is one.
     low, high : str
-        Cure of a value below and above.
+        Cure of a value below and above the range.
     doubt : str
-        Row of ``plausibility.SCENE_CHECKS`` or ``RECORD_CHECKS`` that asks the same, or words of
-        the run's warning that tells the same; "" where none does.
+        Row of ``plausibility.SCENE_CHECKS`` or ``RECORD_CHECKS`` for the same quantity, or words of
+        the run's warning about it; "" if there is none.
     """
 
     name: str
@@ -82,31 +82,31 @@ class Figure:
 
     @property
     def worst(self) -> tuple[str, float]:
-        """Place and value furthest from usual; inside it that nearest to an end."""
+        """Place and value furthest outside the usual range; inside it, closest to an end."""
         return max(self.values.items(), key=lambda each: self._excess(each[1]))
 
     @property
     def usual(self) -> bool:
-        """Whether all values are."""
+        """Whether all values are in the usual range."""
         return self._excess(self.worst[1]) <= _ROUNDING
 
     @property
     def others(self) -> tuple[str, ...]:
-        """Further places outside of what is usual."""
+        """Further places outside the usual range."""
         first = self.worst[0]
         odd = (place for place, value in self.values.items() if self._excess(value) > _ROUNDING)
         return tuple(place for place in odd if place != first)
 
     @property
     def cure(self) -> str:
-        """What helps; "" where all is usual."""
+        """Cure; "" if all values are usual."""
         if self.usual:
             return ""
         value = self.worst[1]
         return self.quantity.low if value < self.quantity.least else self.quantity.high
 
     def _excess(self, value: float) -> float:
-        """Logarithm of how far a value is beyond the nearer end, negative inside."""
+        """Logarithmic distance of a value beyond the nearer end, negative inside."""
         low, high = self.quantity.least, self.quantity.most
         if math.isnan(value):
             return math.inf
@@ -116,20 +116,20 @@ class Figure:
 
 
 def _ratio(larger: float, smaller: float) -> float:
-    """Logarithm of one value over another, infinite or its sign where one is not above zero."""
+    """Logarithm of a ratio; infinite or its sign if a value is not above zero."""
     if larger > 0 and smaller > 0:
         return math.log(larger / smaller)
     return math.copysign(math.inf, larger - smaller) if larger != smaller else 0.0
 
 
 def figures(table: Sequence[Quantity], facts: Any) -> tuple[Figure, ...]:
-    """All rows of a table that a scene has.
+    """All rows of a table that apply to a scene.
 
     Parameters
     ----------
     table : sequence of Quantity
     facts : object
-        What their `measure` takes.
+        Argument of their `measure`.
 
     Returns
     -------
@@ -146,13 +146,13 @@ class ShortRun:
     Attributes
     ----------
     scene : Scene
-        As it was run, its duration changed.
+        Scene of the run, with changed duration.
     solution : Recording
-        With its truth where the machine turns; signals of zeros where the run failed.
+        With its truth if the machine turns; signals of zeros if the run failed.
     warnings : tuple of str
-        Of the run; without doubts.
+        Warnings of the run, without doubts.
     doubts : tuple of Doubt
-        About its recording; those about the scene are not of the trial.
+        Doubts about its recording; those about the scene are separate.
     """
 
     scene: Scene
@@ -162,22 +162,22 @@ class ShortRun:
 
     @property
     def ok(self) -> bool:
-        """Whether the run came to its end."""
+        """Whether the run was completed."""
         return self.solution.status.ok
 
 
 def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> ShortRun:
-    """Run a scene for some revolutions, fewer where they would cost too much.
+    """Run a scene for some revolutions, or fewer if they are too costly.
 
     Parameters
     ----------
     scene : Scene
     turns : float
-        Revolutions recorded, at most; one at least.
+        Largest number of revolutions recorded; at least one.
     seconds : float
-        Tabulated processor time that they may take [s].
+        Tabulated processor time allowed [s].
     truth : bool
-        Keep hidden states.
+        Whether to keep hidden states.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class PlainFacts:
-    """A scene and a short run of it: all that is known of a machine without figures of its own."""
+    """A scene and a short run, for a machine without figures of its own."""
 
     scene: Scene
     trial: ShortRun
@@ -210,7 +210,7 @@ def plain_facts(scene: Scene) -> PlainFacts:
 
 
 def over_range(run: ShortRun) -> dict[str, float]:
-    """Largest deviation from its mean over the range of every sensor in a trial."""
+    """Largest deviation from the mean over the range, for every sensor in a trial."""
     if not run.ok:
         return {}
     ranges, _ = sensor_limits(run.scene)
@@ -230,13 +230,13 @@ def taylor_share(
     Parameters
     ----------
     speed : float
-        Of the surface [m/s].
+        Surface speed [m/s].
     radius, gap : float
-        Of the journal, and the radial clearance [m].
+        Radius of the journal, and the radial clearance [m].
     viscosity : float
-        Dynamic [Pa s].
+        Dynamic viscosity [Pa s].
     density : float
-        [kg/m^3]
+        Density [kg/m^3].
 
     Returns
     -------
@@ -256,10 +256,10 @@ def taylor_share(
 
 
 OIL_DENSITY = 870.0
-"""Of mineral oil where a scene gives none [kg/m^3]; all are within 5 % of it."""
+"""Density of mineral oil if a scene gives none [kg/m^3]; all are within 5 % of it."""
 
 
-# --- rows that all machines have
+# --- rows of all machines
 
 
 def _turns(facts: Any) -> dict[str, float]:
@@ -299,7 +299,7 @@ RECORDING = (
         unit="",
         measure=_samples,
         least=20.0,
-        reason="orders up to 8 with the usual 2.56 samples a period",
+        reason="orders up to 8 with the usual 2.56 samples per period",
         low="raise sample_rate, or check the unit of drive.speed",
     ),
     Quantity(
@@ -308,9 +308,9 @@ RECORDING = (
         measure=lambda facts: over_range(facts.trial),
         least=LEAST_LEVEL,
         most=0.95,
-        reason="a range is chosen to be used, and not to clip",
-        low="lower the sensor's range, or look for what should excite the machine",
-        high="raise the sensor's range, or look for what shakes it so much",
+        reason="a range should be used, but not clip",
+        low="lower the sensor's range, or check the excitation of the machine",
+        high="raise the sensor's range, or find the cause of the vibration",
         doubt="faint",
     ),
     Quantity(
@@ -330,4 +330,4 @@ RECORDING = (
         high="shorten duration, or lower sample_rate",
     ),
 )
-"""Rows that every machine's table ends with."""
+"""Rows at the end of every machine's table."""

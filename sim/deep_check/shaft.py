@@ -1,4 +1,4 @@
-"""Deep check of a propulsion shaft: its figures beside what is usual."""
+"""Deep check of a propulsion shaft: its figures compared with usual values."""
 
 import itertools
 import math
@@ -22,25 +22,25 @@ from ..shaft.line_beam import shaft_beam
 from .rows import OIL_DENSITY, RECORDING, Quantity, ShortRun, taylor_share, trial
 
 _TURNS = 4.0  # of the trial: the response is steady from its first sample
-_SECONDS = 4.0  # tabulated, of the trial
-_RESONANT = 0.1  # damping ratio below which a motion is called a resonance
-_RESONANCES = 10  # looked at beside the blade rate: the lowest
+_SECONDS = 4.0  # tabulated time of the trial
+_RESONANT = 0.1  # damping ratio below which a mode counts as a resonance
+_RESONANCES = 10  # lowest resonances checked against the blade rate
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShaftFacts:
-    """A shaft line, its state of rest, its alignment, and a short run of it.
+    """A shaft line, its equilibrium, its alignment, and a short run of it.
 
     Attributes
     ----------
     scene : ShaftScene
     trial : Trial
     state : ShaftState
-        On its films, in the running condition; of no balance where its status says so.
+        On its films, in the running condition; its status shows if there is no equilibrium.
     modes : sequence of float
-        Of the shaft on its seats, rising [Hz].
+        Natural frequencies of the shaft on its seats, rising [Hz].
     aligned : LineState or None
-        On elastic seats, running; None where the loads tip the shaft off them.
+        On elastic seats, running; None if the loads tip the shaft off them.
     """
 
     scene: ShaftScene
@@ -51,7 +51,7 @@ class ShaftFacts:
 
 
 def shaft_facts(scene: ShaftScene) -> ShaftFacts:
-    """Bring a line to rest on films and on seats, and record some revolutions of it."""
+    """Find the equilibrium of a line on films and on seats, and record some revolutions."""
     try:
         aligned = reactions(alignment_line(scene), alignment_conditions(scene)["running"])
     except AlignmentError:
@@ -68,36 +68,36 @@ def shaft_facts(scene: ShaftScene) -> ShaftFacts:
 def _each(
     measure: Callable[[ShaftScene, ShaftBearing], float],
 ) -> Callable[[Any], dict[str, float]]:
-    """One value of every bearing, from the scene alone."""
+    """One value for every bearing, from the scene alone."""
     return lambda facts: {b.name: measure(facts.scene, b) for b in facts.scene.bearings}
 
 
 def _balanced(
     measure: Callable[[ShaftFacts], NDArray[np.float64]],
 ) -> Callable[[Any], dict[str, float]]:
-    """One value of every bearing, from the state on its films; none without a balance."""
+    """One value for every bearing, from the state on its films; none without an equilibrium."""
 
-    def found(facts: ShaftFacts) -> dict[str, float]:
+    def values(facts: ShaftFacts) -> dict[str, float]:
         if not facts.state.film.status.ok:
             return {}
         names = [bearing.name for bearing in facts.scene.bearings]
         return dict(zip(names, np.asarray(measure(facts), dtype=float).tolist(), strict=True))
 
-    return found
+    return values
 
 
 def _numeric(name: str, scale: float = 1.0) -> Callable[[Any], dict[str, float]]:
-    """A guard of the trial run."""
+    """A numeric result of the trial run."""
 
-    def found(facts: ShaftFacts) -> dict[str, float]:
+    def value(facts: ShaftFacts) -> dict[str, float]:
         numerics = facts.trial.solution.numerics
         return {"": scale * float(numerics[name])} if name in numerics else {}
 
-    return found
+    return value
 
 
 def _gap(bearing: ShaftBearing) -> float:
-    """Radial clearance of the circle that the journal lies in, as it is now [m]."""
+    """Radial clearance of the circle in which the journal lies, in its present state [m]."""
     if bearing.wear_down > 0 and bearing.worn_shape == "arc":
         return bearing.arc_clearance * bearing.diametral_clearance / 2
     return (bearing.diametral_clearance + bearing.wear_down) / 2
@@ -153,7 +153,7 @@ def _seat_deflection(facts: ShaftFacts) -> NDArray[np.float64]:
 
 
 def _off_limits(facts: ShaftFacts) -> dict[str, float]:
-    """By how much a limit is missed in the running condition, of the limit [%]."""
+    """Violation of limits in the running condition, over the limit [%]."""
     if facts.aligned is None:
         return {}
     return {
@@ -167,7 +167,7 @@ def _off_limits(facts: ShaftFacts) -> dict[str, float]:
 
 
 def _sag(facts: ShaftFacts) -> dict[str, float]:
-    """Of each span between the straight line through its bearings, over its length."""
+    """Sag of each span below the line through its bearings, over its length."""
     if facts.aligned is None:
         return {}
     bearings, line = facts.scene.bearings, facts.aligned
@@ -191,7 +191,7 @@ def _span(facts: ShaftFacts) -> dict[str, float]:
 def seated_modes(scene: ShaftScene) -> NDArray[np.float64]:
     """Natural frequencies of the shaft at rest on its housings' stiffness.
 
-    Films are left out: they are stiffer than most housings, and the slow motions that they add at
+    Films are neglected: they are stiffer than most housings, and the slow motions that they add at
     half the speed are no modes of the shaft.
 
     Parameters
@@ -267,7 +267,7 @@ def _elements(facts: ShaftFacts) -> dict[str, float]:
 
 
 def _wave(facts: ShaftFacts) -> dict[str, float]:
-    """Shortest wave recorded over the diameter, of the beam without shear."""
+    """Shortest wave recorded over the diameter, for a beam without shear."""
     if facts.scene.shaft.theory != "euler-bernoulli":
         return {}
     thickest = max(section.outer_diameter for section in facts.scene.sections)
@@ -281,7 +281,7 @@ SHAFT_ROWS = (
         measure=_each(_surface),
         least=0.2,
         most=40.0,
-        reason="2 to 10 of ships' lines",
+        reason="2 to 10 in ships' lines",
         low="check drive.speed (rpm or rev/s) and the bearing's diameter",
         high="lower drive.speed (rpm or rev/s?), or check the bearing's diameter",
     ),
@@ -340,7 +340,7 @@ SHAFT_ROWS = (
         measure=_balanced(lambda facts: 1e-6 * _loads(facts) / _areas(facts)),
         least=0.01,
         most=1.2,
-        reason="0.1 to 0.8 of white metal in ships' lines",
+        reason="0.1 to 0.8 for white metal in ships' lines",
         low="raise that bearing's offset, or shorten it",
         high="lower that bearing's offset, or lengthen it",
     ),
@@ -376,7 +376,7 @@ SHAFT_ROWS = (
         most=20.0,
         reason="eta N L D / W (R / C)^2; lines are lightly loaded",
         low="raise oil viscosity or drive.speed, or lower that bearing's load or clearance",
-        high="raise that bearing's offset: it carries next to nothing; or lower oil viscosity",
+        high="raise that bearing's offset: it is almost unloaded; or lower oil viscosity",
     ),
     Quantity(
         name="eccentricity at rest",
@@ -385,7 +385,7 @@ SHAFT_ROWS = (
         least=0.02,
         most=0.9,
         reason="0.1 to 0.8",
-        low="raise that bearing's offset: it carries next to nothing; or lower oil viscosity",
+        low="raise that bearing's offset: it is almost unloaded; or lower oil viscosity",
         high="raise oil viscosity or the bearing's length, or lower its offset",
     ),
     Quantity(
@@ -401,7 +401,7 @@ SHAFT_ROWS = (
         unit="",
         measure=_balanced(_edge),
         least=0.2,
-        reason="below a fifth the edge is what runs",
+        reason="below a fifth the journal runs on its edge",
         low="turn the bore towards the shaft (slope), or shorten the bearing",
         doubt="runs on its edge",
     ),
@@ -411,7 +411,7 @@ SHAFT_ROWS = (
         measure=_each(_taylor),
         most=1.0,
         reason="all rungs are laminar: below 41.2 sqrt(R / C) (Taylor)",
-        high="raise oil viscosity, or lower the clearance: no rung knows turbulence",
+        high="raise oil viscosity, or lower the clearance: no rung models turbulence",
     ),
     Quantity(
         name="first critical over speed",
@@ -426,7 +426,7 @@ SHAFT_ROWS = (
         unit="%",
         measure=_blades,
         least=10.0,
-        reason="a margin of 20 is good practice beside it; damping below 10 %, on films",
+        reason="a margin of 20 is good practice; damping below 10 %, on films",
         low="choose other propeller.blades or drive.speed, or change the aftmost span",
     ),
     Quantity(
@@ -434,7 +434,7 @@ SHAFT_ROWS = (
         unit="",
         measure=_in_band,
         most=0.5,
-        reason="a recording should see the first modes of its shaft",
+        reason="a recording should include the first modes of its shaft",
         high="raise sample_rate, or check the lengths of the sections",
     ),
     Quantity(
@@ -443,7 +443,7 @@ SHAFT_ROWS = (
         measure=_each(_housing_hertz),
         least=20.0,
         most=1500.0,
-        reason="sqrt(k / m) / 2 pi; 100 to 500 of pedestals and stern tubes",
+        reason="sqrt(k / m) / 2 pi; 100 to 500 for pedestals and stern tubes",
         low="raise housing.stiffness_up, or lower housing.mass",
         high="lower housing.stiffness_up, or raise housing.mass",
     ),
@@ -452,7 +452,7 @@ SHAFT_ROWS = (
         unit="",
         measure=_each(_housing_band),
         most=1.0,
-        reason="a mode above moves nothing that is recorded",
+        reason="a mode above is not recorded",
         high="raise sample_rate, or lower housing.stiffness_up",
     ),
     Quantity(
@@ -469,7 +469,7 @@ SHAFT_ROWS = (
         measure=_numeric("motion_share"),
         least=1e-4,
         most=0.3,
-        reason="the response is linear about the state of rest, good to 0.3",
+        reason="the response is linear about the equilibrium, valid to 0.3",
         low="give discs their unbalance (kg m), or the propeller its blade_rate",
         high="lower unbalance, blade_rate or turbulence",
         doubt="of its least film",
@@ -502,4 +502,4 @@ SHAFT_ROWS = (
     ),
     *RECORDING,
 )
-"""Every figure of a shaft line. A new one is one function and one row."""
+"""All figures of a shaft line. A new one is one function and one row."""

@@ -8,7 +8,7 @@ rung         assumes                                   gives
 ===========  ========================================  =====================================
 none         no pressure                               0
 constant     a plunger against a constant pressure     `discharge`
-two-level    quasi-static, lines without loss          `suction` and `discharge` by turns
+two-level    quasi-static, lines without loss          `suction` and `discharge` in turn
 heads        quasi-static, liquid without compression  energy balance of the lines, added mass
 chamber      one pressure in the chamber, manifolds    compression, air, vapour, moving valves,
              at constant pressure                      leaks, stuck valves

@@ -1,4 +1,4 @@
-"""One step of a chamber: pressure, vapour and both valves together, implicit, at second order."""
+"""One step of a chamber: pressure, vapour and both valves together, implicit, of second order."""
 
 import math
 from typing import Any
@@ -33,17 +33,17 @@ CHAMBER_STATE = (
     "discharge_lift",
     "discharge_lift_rate",
 )
-"""Names of the chamber's state: [Pa], [m^3], [m], [m/s], [m], [m/s]."""
+"""Columns of the chamber's state: [Pa], [m^3], [m], [m/s], [m], [m/s]."""
 
 GATHERED = (1, 2, 4)
 """Columns of the chamber's state that a recording needs at every step: vapour and lifts."""
 
 CHAMBER_FLOWS = ("suction_volume", "discharge_volume", "suction_impulse", "discharge_impulse")
-"""Names of what a chamber step hands out: [m^3] twice, [N s] twice."""
+"""Results of a chamber step: [m^3] twice, [N s] twice."""
 
-_NEWTON_SHARE = 1e-3  # of the smaller pressure drop: the flow's next correction is its square
+_NEWTON_SHARE = 1e-3  # of the smaller pressure drop: the next correction of the flow is its square
 _SETTLED = 1e-8  # of the absolute pressure: the next correction is its square
-_MOST_ITERATIONS = 60  # bisection alone narrows 1e9 Pa to rounding in that many
+_MOST_ITERATIONS = 60  # bisection alone narrows 1e9 Pa to rounding in as many
 _PRESSURE_LIMIT = 1e10  # Pa, beyond any liquid model
 
 # TR-BDF2 with equal implicit parts in both stages: Hosea and Shampine 1996.
@@ -56,7 +56,7 @@ _EXPLICIT = math.sqrt(2.0) / 4.0
 def _newton(
     p: float, air: float, mass: float, volume: float, dt: float, valves: Any, h: Any
 ) -> Any:
-    """Room that a stage's pressure leaves, Newton's change of it, flows with slopes; if it will do.
+    """Volume error of a stage's pressure, its Newton change, flows with slopes; whether acceptable.
 
     The equation is that of :func:`_balance`.
     """
@@ -86,10 +86,10 @@ def _balance(
 ) -> Any:
     """Pressure at the end of an implicit stage; flows; volume of the vapour.
 
-    Solves ``V = v(p) (mass + dt (Q_s(p) - Q_d(p)))``, whose right side falls with p: Newton, kept
-    inside a bracket that starts at the vapour pressure. Where even that pressure leaves room, the
-    room is vapour. The flows end on the tangent of the last iterate, so that the mass
-    is booked exactly and the pressure follows it.
+    Solves ``V = v(p) (mass + dt (Q_s(p) - Q_d(p)))``, whose right side falls with p: Newton's
+    method inside a bracket that starts at the vapour pressure. If even that pressure does not fill
+    the volume, the rest is vapour. The flows are taken on the tangent of the last iterate, so that
+    the mass is booked exactly and the pressure follows it.
     """
     low, high, floor_open = h.vapour, _PRESSURE_LIMIT, True
     p, q_s, q_d = max(guess, low), 0.0, 0.0
@@ -125,7 +125,7 @@ def _balance(
 
 @kernel
 def _settled(p: float, volume: float, held: float, known: Any, h: Any) -> Any:
-    """Pressure and vapour of a mass in a volume, from a good guess: the books are exact."""
+    """Pressure and vapour of a mass in a volume, from a good guess: mass is conserved exactly."""
     for _ in range(_MOST_ITERATIONS):
         change = _settling(p, air_near(p, known, h), volume, held, h)
         p += change
@@ -157,10 +157,10 @@ def _balance_at_once(
     last_stage: bool,
     h: Any,
 ) -> Any:
-    """As :func:`_balance`, in the fewest iterations that mostly do; whether they did.
+    """Like :func:`_balance` in the usual number of iterations; and whether these were enough.
 
-    Newton twice, or once and once more for the books, and no bound had a say in it: then these
-    are the same numbers in the same order, without a loop or a branch.
+    Two Newton steps, or one and one more for the mass, without touching a bound: if that suffices,
+    the numbers and their order are the same, without a loop or a branch.
     """
     air, near = air_series(guess, known, h)
     room, change, q_s, q_d, s_s, s_d, fine = _newton(guess, air, mass, volume, dt, valves, h)
@@ -186,7 +186,7 @@ def _balance_at_once(
 
 @kernel
 def _expected_contacts(dt: float, guess: float, start: Any, valves: Any, h: Any) -> Any:
-    """Which valves touch at the end of a stage under a guessed pressure."""
+    """Contacts of both valves at the end of a stage, expected under a guessed pressure."""
     lift_s, rate_s, lift_d, rate_d = start
     suction, shares_s, discharge, shares_d = valves
     line_s = lift_line(lift_s, rate_s, 0.0, shares_s, suction)
@@ -198,7 +198,7 @@ def _expected_contacts(dt: float, guess: float, start: Any, valves: Any, h: Any)
 
 @kernel
 def _lines(on_s: float, on_d: float, start: Any, valves: Any) -> Any:
-    """Both valves as lines over the pressure drop, as :func:`_balance` takes them."""
+    """Both valves as lines over the pressure drop, for :func:`_balance`."""
     lift_s, rate_s, lift_d, rate_d = start
     suction, shares_s, discharge, shares_d = valves
     return (
@@ -213,7 +213,7 @@ def _lines(on_s: float, on_d: float, start: Any, valves: Any) -> Any:
 
 @kernel
 def _outcome(p: float, dt: float, on_s: float, on_d: float, lines: Any, h: Any) -> Any:
-    """Rates of both valves at the end of a stage, and the contacts that agree with them."""
+    """Rates of both valves at the end of a stage, and the contacts consistent with them."""
     lift_s, line_s, suction, lift_d, line_d, discharge = lines
     v_s = line_s[0] + line_s[1] * (h.suction - p)
     v_d = line_d[0] + line_d[1] * (p - h.discharge)
@@ -238,9 +238,9 @@ def _stage(
     at_once: bool,
     h: Any,
 ) -> Any:
-    """One implicit stage: pressure first, the valves as lines over it; contact as it turns out.
+    """Take one implicit stage: pressure first, then the valves as lines over it, then contacts.
 
-    The last value is false where a stage `at_once` did not find its end.
+    The last value is false if a stage with `at_once` did not converge.
     """
     on_s, on_d = _expected_contacts(dt, guess, start, valves, h)
     if at_once:
@@ -262,7 +262,7 @@ def _stage(
 
 @kernel
 def _touches_still(lift: float, rate: float, contact: float, side: Any) -> float:
-    """Contact that agrees with a stage's outcome; one that pushes is kept."""
+    """Contact consistent with a stage's outcome; one that pushes is kept."""
     pushes = seat_force(lift, rate, contact, side) * contact <= 0.0
     kept = contact if pushes else 0.0
     return kept if contact != 0.0 else touches(lift, rate, side)
@@ -294,9 +294,9 @@ def _substep(
     at_once: bool,
     h: Any,
 ) -> Any:
-    """TR-BDF2 over one substep: two implicit stages with the same implicit part.
+    """Take one substep of TR-BDF2: two implicit stages with the same implicit part.
 
-    The last value is false where a stage `at_once` did not find its end.
+    The last value is false if a stage with `at_once` did not converge.
     """
     p0, _, z_s, v_s, z_d, v_d = state
     suction, _, discharge, _ = valves
@@ -343,7 +343,7 @@ def _substep(
 
 @kernel
 def _mass(pressure: float, air: float, volume: float, h: Any) -> float:
-    """What a volume holds, in volumes at atmospheric pressure [m^3]."""
+    """Mass in a volume, as volume at atmospheric pressure [m^3]."""
     mass: float = volume / mixture_volume(pressure, air, h)[0]
     return mass
 
@@ -360,31 +360,31 @@ def chamber_at_once(
     x1: float,
     v1: float,
 ) -> Any:
-    """As :func:`chamber_step` in one substep, for chambers side by side.
+    """Like :func:`chamber_step` in one substep, for chambers in parallel.
 
     Parameters
     ----------
     state : tuple of float
-        As :data:`CHAMBER_STATE`.
+        Fields of :data:`CHAMBER_STATE`.
     air : float
-        :func:`air_volume` at its pressure.
+        :func:`air_volume` at the state's pressure.
     h : record of dtype HYDRAULIC, or a tuple with its names
     valves : tuple
-        :func:`suction_side`, what :func:`valve_shares` makes of it over an :func:`implicit_part` of
-        the step, and both of the discharge side.
+        :func:`suction_side`, its :func:`valve_shares` over an :func:`implicit_part` of
+        the step, and both for the discharge side.
     step, x0, v0, x1, v1 : float
-        As there.
+        As in :func:`chamber_step`.
 
     Returns
     -------
     state : tuple of float
-        At the end of the step.
+        State at the end of the step.
     suction_impulse, discharge_impulse : float
-        As :data:`CHAMBER_FLOWS` [N s].
+        As in :data:`CHAMBER_FLOWS` [N s].
     sure : bool
-        These are the very numbers of :func:`chamber_step`; else it must be asked. That is so in
-        one step of a hundred: where a valve comes down on its seat, vapour fills the chamber, or
-        the pressure leaps.
+        Whether these are exactly the numbers of :func:`chamber_step`; if not, use that function.
+        This occurs in one step of a hundred: when a valve closes, vapour fills the chamber, or
+        the pressure jumps.
     """
     mass = _mass(state[0], air, _volume(x0, h) - state[1], h)
     middle, end = _volume(_hermite(_GAMMA, step, x0, v0, x1, v1), h), _volume(x1, h)
@@ -396,7 +396,7 @@ def chamber_at_once(
 
 @kernel
 def implicit_part(step: float) -> float:
-    """Of a substep: what either stage of TR-BDF2 takes implicitly [s]."""
+    """Implicit part of a substep in either stage of TR-BDF2 [s]."""
     return _IMPLICIT * step
 
 
@@ -420,22 +420,22 @@ def chamber_step(
         Columns as :data:`CHAMBER_STATE`; replaced by the state at the end of the step.
     flows : numpy.ndarray [shape=(4,)]
         Columns as :data:`CHAMBER_FLOWS`, replaced by those of this step: the volumes through the
-        two valves in their opening directions, counted at atmospheric pressure [m^3], and the
+        two valves in their opening directions, at atmospheric pressure [m^3], and the
         impulses of seat and stop on the casing [N s], positive along the closing direction of the
         valve.
     h : record of dtype HYDRAULIC
-        Of the rung *chamber*.
+        Record with the rung *chamber*.
     step : float
-        [s]
+        Step of the mechanism [s].
     x0, v0, x1, v1 : float
-        Piston position [m] and velocity [m/s] at both ends; a cubic between them.
+        Piston position [m] and velocity [m/s] at both ends; interpolated by a cubic.
     substeps : int
         See :func:`chamber_substeps`.
 
     Returns
     -------
     int
-        ``CHAMBER_OK``, or why `state` was left as it was.
+        ``CHAMBER_OK``, or why `state` was left unchanged.
 
     Notes
     -----
@@ -447,12 +447,12 @@ def chamber_step(
         m z'' + c z' + k z + F_0 = C_f A_v dp + seat and stop
 
     with dp over the valve in its opening direction, flow of either sign, and the plate's
-    displacement after Westphal. ``sqrt(dp)`` reads ``dp / sqrt(|dp| + 1 Pa)``: under little
-    pressure a gap is viscous. Seat and stop are springs with dampers that push only.
+    displacement after Westphal. ``sqrt(dp)`` is computed as ``dp / sqrt(|dp| + 1 Pa)``: at low
+    pressure a gap is viscous. Seat and stop are springs with dampers that only push.
 
-    TR-BDF2 is L-stable and of second order in the pressure as well as in the valves, on which the
+    TR-BDF2 is L-stable and of second order in the pressure and in the valves, on which the
     pressure depends through the plate's displacement: each stage eliminates the valves and solves
-    one scalar equation for the pressure. Liquid columns in the manifolds are not part of it.
+    one scalar equation for the pressure. Liquid columns in the manifolds are not included.
 
     References
     ----------

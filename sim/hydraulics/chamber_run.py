@@ -1,4 +1,4 @@
-"""A chamber by itself: its start at rest, and its run on a prescribed motion of the piston."""
+"""A chamber by itself: its initial state, and a run with a prescribed motion of the piston."""
 
 import math
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 from ..jit import kernel
 from .chamber import CHAMBER_FLOWS, CHAMBER_OK, CHAMBER_STATE, chamber_step
 
-_STEP_PER_CONTACT_TIME = 0.5  # 12 substeps a period of the valve on its seat
+_STEP_PER_CONTACT_TIME = 0.5  # 12 substeps per period of the valve on its seat
 
 
 def chamber_substeps(h: Any, step: float) -> int:
-    """Substeps of a step that resolve a valve's contact with its seat.
+    """Number of substeps of a step that resolve a valve's contact with its seat.
 
     Parameters
     ----------
     h : record of dtype HYDRAULIC
     step : float
-        Of the mechanism [s], > 0.
+        Step of the mechanism [s], > 0.
 
     Returns
     -------
     int
-        At least 1; 12 substeps or more in a period of the stiffer contact. More is never needed
-        for stability, only for accuracy: the method is L-stable.
+        At least 1, and at least 12 substeps per period of the stiffer contact. More are never
+        needed for stability, only for accuracy: the method is L-stable.
 
     Examples
     --------
@@ -49,12 +49,12 @@ def chamber_substeps(h: Any, step: float) -> int:
 
 
 def chamber_start(h: Any, x: float, v: float) -> NDArray[np.float64]:
-    """Chamber in balance with a steadily moving piston: one valve open, the other on its seat.
+    """Chamber in equilibrium with a steadily moving piston: one valve open, the other closed.
 
     Parameters
     ----------
     h : record of dtype HYDRAULIC
-        Of the rung *chamber*.
+        Record with the rung *chamber*.
     x, v : float
         Piston position [m] and velocity [m/s].
 
@@ -84,12 +84,12 @@ def chamber_start(h: Any, x: float, v: float) -> NDArray[np.float64]:
     pressure = max(pressure, float(h["vapour"]))
     suction = _steady_lift(h, "suction", float(h["suction"]) - pressure)
     discharge = _steady_lift(h, "discharge", pressure - float(h["discharge"]))
-    del x  # the balance holds at any position
+    del x  # the equilibrium is independent of the position
     return np.array([pressure, 0.0, suction, 0.0, discharge, 0.0])
 
 
 def _steady_lift(h: Any, side: str, drop: float) -> float:
-    """Lift at rest under a pressure drop: on the spring, pressed into the seat or the stop."""
+    """Lift at rest under a pressure drop: on the spring, or pressed into the seat or the stop."""
     if h[f"{side}_stuck"] >= 0:
         return float(h[f"{side}_stuck"])
     force = float(h[f"{side}_force_area"]) * drop - float(h[f"{side}_preload"])
@@ -101,7 +101,7 @@ def _steady_lift(h: Any, side: str, drop: float) -> float:
 
 
 def _steady_drop(h: Any, side: str, flow: float) -> float:
-    """Pressure drop at which the valve, at rest, passes a flow [Pa]; by bisection."""
+    """Pressure drop for a flow through the valve at rest [Pa]; by bisection."""
     low, high = 0.0, 1e9
     for _ in range(100):
         drop = 0.5 * (low + high)
@@ -117,16 +117,16 @@ def _steady_drop(h: Any, side: str, flow: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class ChamberRun:
-    """A chamber driven by a given motion of its piston.
+    """A chamber driven by a prescribed motion of its piston.
 
     Attributes
     ----------
     states : numpy.ndarray [shape=(n_steps + 1, 6)]
         Columns as :data:`CHAMBER_STATE`, at the ends of the steps.
     flows : numpy.ndarray [shape=(n_steps, 4)]
-        Columns as :data:`CHAMBER_FLOWS`, of each step.
+        Columns as :data:`CHAMBER_FLOWS`, for each step.
     code : int
-        ``CHAMBER_OK``, or why the run ends early.
+        ``CHAMBER_OK``, or why the run ended early.
     """
 
     states: NDArray[np.float64]
@@ -143,25 +143,25 @@ def run_chamber(
     substeps: int | None = None,
     start: NDArray[np.float64] | None = None,
 ) -> ChamberRun:
-    """Drive a chamber by a piston whose motion is known.
+    """Run a chamber with a prescribed motion of the piston.
 
     Parameters
     ----------
     h : record of dtype HYDRAULIC
-        Of the rung *chamber*.
+        Record with the rung *chamber*.
     piston, velocity : numpy.ndarray [shape=(n_steps + 1,)]
         Position [m] and velocity [m/s] at the ends of the steps.
     step : float
-        [s]
+        Step [s].
     substeps : int, optional
-        As :func:`chamber_substeps` where it is not given.
+        By default :func:`chamber_substeps`.
     start : numpy.ndarray [shape=(6,)], optional
-        As :func:`chamber_start` where it is not given.
+        By default :func:`chamber_start`.
 
     Returns
     -------
     ChamberRun
-        Cut off before the step in which it failed where the code is not ``CHAMBER_OK``.
+        Truncated before the step that failed if the code is not ``CHAMBER_OK``.
 
     Examples
     --------

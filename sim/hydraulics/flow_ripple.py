@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def flow_shape(angle: ArrayLike, crank_to_rod: float) -> NDArray[np.float64]:
-    """Flow into a cylinder without valves' delays, over ``A r w``.
+    """Flow into a cylinder with ideal valves, over ``A r w``.
 
     Parameters
     ----------
@@ -42,19 +42,19 @@ def flow_slope(angle: ArrayLike, crank_to_rod: float) -> NDArray[np.float64]:
 
 
 def even_phases(cylinders: int, turn: float = 2 * math.pi) -> NDArray[np.float64]:
-    """Crank offsets of cylinders spread evenly over a turn [rad].
+    """Crank offsets of cylinders spread evenly over an angle [rad].
 
     Parameters
     ----------
     cylinders : int
-        Their number.
+        Number of cylinders.
     turn : float
-        Angle they share [rad].
+        Angle that they share [rad].
 
     Returns
     -------
     numpy.ndarray [shape=(cylinders,)]
-        From 0 on [rad].
+        Offsets from 0 on [rad].
 
     Examples
     --------
@@ -66,12 +66,12 @@ def even_phases(cylinders: int, turn: float = 2 * math.pi) -> NDArray[np.float64
 
 @dataclass(frozen=True, kw_only=True)
 class FlowRipple:
-    """Extremes of a pump's flow about its mean.
+    """Extremes of a pump's flow relative to its mean.
 
     Attributes
     ----------
     above, below, total : float
-        Largest flow above the mean, smallest below it, and their sum, over the mean.
+        Largest flow above the mean, largest deficit below it, and their sum, over the mean.
     """
 
     above: float
@@ -91,13 +91,13 @@ def flow_ripple(
     phases : array_like [shape=(n_cylinders,)]
         Offsets of the cranks [rad], see :func:`even_phases`.
     double_acting : bool
-        Both sides of the pistons deliver; the rod's area is neglected.
+        Whether both sides of the pistons deliver; the rod's area is neglected.
 
     Returns
     -------
     FlowRipple
         From the exact kinematics; the extremes are those of smooth arcs between dead centres,
-        found to 1e-9 of the mean.
+        accurate to 1e-9 of the mean.
 
     Raises
     ------
@@ -135,12 +135,12 @@ def acceleration_constant(
     phases : array_like [shape=(n_cylinders,)]
         Offsets of the cranks [rad], see :func:`even_phases`.
     double_acting : bool
-        Both sides of the pistons draw; the rod's area is neglected.
+        Whether both sides of the pistons draw; the rod's area is neglected.
 
     Returns
     -------
     float
-        [min/s]: L line length, V mean speed in the line, n crank speed in rpm, K = 1.
+        Constant [min/s]: L line length, V mean speed in the line, n crank speed in rpm, K = 1.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def acceleration_constant(
 
     Notes
     -----
-    ``C = (2 pi / 60) max(dQ/da) / mean Q``: the steepest rise of the common flow.
+    ``C = (2 pi / 60) max(dQ/da) / mean Q``: the steepest rise of the total flow.
 
     References
     ----------
@@ -172,7 +172,7 @@ def _checked_phases(crank_to_rod: float, phases: ArrayLike) -> NDArray[np.float6
     if not 0 <= crank_to_rod < 1:
         raise ValueError(f"crank_to_rod = {crank_to_rod} must be in [0, 1); lengthen the rod")
     if offsets.size == 0:
-        raise ValueError("phases are empty, must be one for each cylinder; give at least one")
+        raise ValueError("phases must not be empty; give one for each cylinder")
     return offsets
 
 
@@ -180,7 +180,7 @@ _ARC_POINTS = 513
 
 
 def _arcs(offsets: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles between neighbouring dead centres [shape=(n_arcs, n_points)]: no kink inside."""
+    """Angles between neighbouring dead centres [shape=(n_arcs, n_points)], without kinks inside."""
     turn = 2 * math.pi
     centres = np.concatenate([-offsets, math.pi - offsets]) % turn
     kinks = np.unique(np.round(centres, 12))
@@ -198,7 +198,7 @@ def _delivered(
     *,
     drawn: bool = False,
 ) -> NDArray[np.float64]:
-    """Common flow of all cylinders over ``A r w`` on the arcs, or its slope."""
+    """Total flow of all cylinders over ``A r w`` on the arcs, or its slope."""
     angles = arcs + offsets[:, None, None]
     withdraws = (np.sin(angles[..., _ARC_POINTS // 2]) > 0)[..., None]
     flow = shape(angles, crank_to_rod)

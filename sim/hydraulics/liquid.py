@@ -1,11 +1,11 @@
-"""The liquid in a chamber: compression, dissolved and free air, vapour."""
+"""Liquid in a chamber: compression, free air, vapour."""
 
 from typing import Any
 
 from ..jit import kernel, power, subroutine
 from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE
 
-_SERIES_REACH = 0.01  # of the absolute pressure: the series below is exact to 1e-13 there
+_SERIES_REACH = 0.01  # of the absolute pressure: within it the series below is exact to 1e-13
 
 
 @kernel
@@ -19,7 +19,7 @@ def air_volume(pressure: float, h: Any) -> float:
 
 @kernel
 def air_series(pressure: float, known: Any, h: Any) -> Any:
-    """The same, from a known value, and whether that is near enough for this series."""
+    """The same by a series about a known value, and whether that is close enough."""
     e = (pressure - known[0]) * known[2]
     k = h.air_power
     s = 1.0 - e * (k + 4.0) * 0.2
@@ -31,7 +31,7 @@ def air_series(pressure: float, known: Any, h: Any) -> Any:
 
 @kernel
 def air_near(pressure: float, known: Any, h: Any) -> float:
-    """The same: within a hundredth of a known value a series saves the power."""
+    """The same: within a hundredth of a known value by the series, which is faster."""
     near, good = air_series(pressure, known, h)
     volume: float = near if good else _air_far(pressure, h)
     return volume
@@ -39,7 +39,7 @@ def air_near(pressure: float, known: Any, h: Any) -> float:
 
 @subroutine
 def _air_far(pressure: float, h: Any) -> float:
-    """A call of its own: the compiler would take the power in any case, and then choose."""
+    """A separate call: the compiler would otherwise always evaluate the power and then select."""
     volume: float = air_volume(pressure, h)
     return volume
 
@@ -61,7 +61,7 @@ def specific_volume(pressure: float, h: Any) -> Any:
     Parameters
     ----------
     pressure : float
-        Gauge [Pa], above vacuum.
+        Gauge pressure [Pa], above vacuum.
     h : record of dtype HYDRAULIC
 
     Returns
@@ -74,8 +74,8 @@ def specific_volume(pressure: float, h: Any) -> Any:
 
     Notes
     -----
-    Mass is counted in volumes at atmospheric pressure, so that its books are exact. Air neither
-    dissolves nor comes out of solution; the liquid's density is linear in the pressure.
+    Mass is expressed as volume at atmospheric pressure, so that it is conserved exactly. Air
+    neither dissolves nor comes out of solution; the liquid's density is linear in the pressure.
 
     References
     ----------

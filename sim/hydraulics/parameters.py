@@ -1,4 +1,4 @@
-"""Numbers of one cylinder's hydraulics for the kernels: rung, lines, liquid and valves."""
+"""Parameters of one cylinder's hydraulics for the kernels: rung, lines, liquid and valves."""
 
 import math
 
@@ -29,21 +29,21 @@ PRESSURE_CODES = {
     "heads": PRESSURE_HEADS,
     **dict.fromkeys(CHAMBER_RUNGS, PRESSURE_CHAMBER),
 }
-"""Rung of the scene -> code of the kernels, from the cheapest to the best; pipes are told apart."""
+"""Rung of the scene -> code of the kernels, from the cheapest to the best; pipes are separate."""
 
 _VALVE_FIELDS = (
-    "gap_conductance",  # of one metre of lift [m^2/s/sqrt(Pa)]
+    "gap_conductance",  # for one metre of lift [m^2/s/sqrt(Pa)]
     "leak_conductance",  # [m^3/s/sqrt(Pa)]
     "area",  # of the seat openings [m^2]
     "force_area",  # [m^2]
-    "mass",  # [kg], and all below for the whole group
+    "mass",  # [kg], like the following for the whole group
     "stiffness",
     "preload",  # spring force on the closed valves [N]
     "damping",
     "max_lift",
     "seat_stiffness",
     "seat_damping",
-    "stuck",  # lift [m], or -1 where the valves are free
+    "stuck",  # lift [m], or -1 for free valves
 )
 
 _NUMBERS = (
@@ -77,8 +77,8 @@ _NUMBERS = (
 HYDRAULIC = np.dtype(
     [("rung", np.int64), ("two_harmonic", np.int64), *((name, np.float64) for name in _NUMBERS)]
 )
-"""One throw's hydraulics in SI, as :func:`hydraulic_parameters` makes it. Pressures are gauge;
-resistance [Pa s^2/m^6] and inertance [kg/m^4] are of a line with its valves."""
+"""Hydraulics of one throw in SI, from :func:`hydraulic_parameters`. Pressures are gauge;
+resistance [Pa s^2/m^6] and inertance [kg/m^4] include a line and its valves."""
 
 
 def hydraulic_parameters(
@@ -94,18 +94,18 @@ def hydraulic_parameters(
     Parameters
     ----------
     pressure : CylinderPressure
-        Validated by the scene; the kernels trust it.
+        Validated by the scene, not checked again.
     area : float
-        Of the piston face [m^2].
+        Area of the piston [m^2].
     crank_radius, rod_length : float
-        Of the crank mechanism [m]; their sum is the top dead centre.
+        Dimensions of the crank mechanism [m]; their sum is the top dead centre.
     speed : float
-        Crank speed [rad/s], used by :func:`lowest_pressure` alone.
+        Crank speed [rad/s], used only by :func:`lowest_pressure`.
 
     Returns
     -------
     numpy.ndarray [shape=(1,), dtype=HYDRAULIC]
-        Its one record is what the kernels take.
+        One record, the argument of the kernels.
 
     Examples
     --------
@@ -188,11 +188,11 @@ def _inertance(line: Line | None, valve: Valve | None, density: float) -> float:
 
 
 def _valve_values(side: str, valve: Valve | None, liquid: Liquid) -> dict[str, float]:
-    """The group of valves of one side, as one valve; no valve is one that is stuck shut."""
+    """Valves of one side lumped into one; no valve counts as one stuck shut."""
     if valve is None:
         return {f"{side}_mass": 1.0, f"{side}_stuck": 0.0}
     n = valve.count
-    speed = valve.discharge_coefficient * math.sqrt(2.0 / liquid.density)  # of 1 Pa
+    speed = valve.discharge_coefficient * math.sqrt(2.0 / liquid.density)  # at 1 Pa
     values = {
         "gap_conductance": n * speed * math.pi * valve.diameter,
         "leak_conductance": speed * valve.leak_area,

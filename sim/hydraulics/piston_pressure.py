@@ -22,13 +22,13 @@ def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -
         Gauge pressures [Pa].
     h : record of dtype HYDRAULIC
         Its delays and angles [rad]: after each dead centre the level stays for the delay, then
-        changes over the angle by the cubic with zero slope at both ends.
+        changes over the angle by a cubic with zero slope at both ends.
 
     Notes
     -----
-    The delay is what a valve takes to close: its plate follows the flow and is still open at the
-    dead centre, 5 to 15 degrees in plate valves. The angle is what the liquid and its air take to
-    be compressed, ``dV/V = dp/K``; at the other end the dead volume expands, so rise and fall
+    The delay is the closing time of a valve: its plate follows the flow and is still open at the
+    dead centre, for 5 to 15 degrees in plate valves. The angle is due to the compression of the
+    liquid and its air, ``dV/V = dp/K``; at the other end the dead volume expands, so rise and fall
     differ [1]_.
 
     References
@@ -48,7 +48,7 @@ def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -
 
 @kernel
 def _inflow(angle: float, crank_speed: float, piston_velocity: float, h: Any) -> Any:
-    """Flow into the cylinder, its rate so far as it is not the piston's inertia, and its mass."""
+    """Flow into the cylinder, its rate without the part from the piston's inertia, and its mass."""
     if h.two_harmonic == 0:
         return -h.area * piston_velocity, 0.0, 1.0
     ratio = h.crank_radius / h.rod_length
@@ -77,7 +77,7 @@ def _head_pressure(angle: float, crank_speed: float, piston_velocity: float, h: 
     discharge = (
         h.discharge_head
         + kinetic * (outlet_speed * outlet_speed - speed * speed)
-        - h.discharge_resistance * loss  # the flow counts inwards
+        - h.discharge_resistance * loss  # the flow is positive inwards
         - h.discharge_inertance * rate
     )
     inertance = h.suction_inertance + share * (h.discharge_inertance - h.suction_inertance)
@@ -86,14 +86,14 @@ def _head_pressure(angle: float, crank_speed: float, piston_velocity: float, h: 
 
 @kernel
 def line_pressure(angle: float, crank_speed: float, piston_velocity: float, h: Any) -> Any:
-    """Pressure in the cylinder of the rungs without a state, and the liquid that moves along.
+    """Cylinder pressure of the rungs without a state, and the mass of liquid moving along.
 
     Parameters
     ----------
     angle : float
         Crank angle [rad], 0 at the top dead centre.
     crank_speed : float
-        [rad/s]
+        Crank speed [rad/s].
     piston_velocity : float
         x' [m/s], positive towards the cylinder.
     h : record of dtype HYDRAULIC
@@ -102,9 +102,9 @@ def line_pressure(angle: float, crank_speed: float, piston_velocity: float, h: A
     Returns
     -------
     pressure : float
-        Gauge [Pa]; ``-A p`` is its force on the piston along x.
+        Gauge pressure [Pa]; ``-A p`` is its force on the piston along x.
     added_mass : float
-        Of the liquid columns, to be added to the piston's mass [kg].
+        Mass of the liquid columns, to be added to the piston's mass [kg].
 
     Notes
     -----
@@ -116,17 +116,17 @@ def line_pressure(angle: float, crank_speed: float, piston_velocity: float, h: A
 
     with ``R = rho/2 ((f L / D + K) / A_line^2 + zeta / A_valve^2)`` and
     ``M = rho (L / A_line + l / A_valve)``. With the exact flow ``Q = -A x'`` the last term is
-    handed out as the added mass ``A^2 M``, so no acceleration is needed; with the two-harmonic
+    returned as the added mass ``A^2 M``, so no acceleration is needed; with the two-harmonic
     flow ``A r w (sin a + lambda/2 sin 2a)`` it is in the pressure, and the added mass is 0. That
-    flow errs by at most ``0.163 lambda^3`` of ``A r w``. About a dead centre one side
-    passes into the other as in the rung *two-level*.
+    flow has an error of at most ``0.163 lambda^3`` of ``A r w``. Near a dead centre one side
+    changes into the other as in the rung *two-level*.
 
     Valid while the liquid column holds together: see :func:`lowest_pressure`.
 
     References
     ----------
     Xia, Zhang, Yu, Zhu (2017), Ship Science and Technology 39(1), 51-55, eqs 16 to 27 with their
-    misprints mended.
+    misprints corrected.
 
     Examples
     --------
@@ -152,24 +152,24 @@ def line_pressure(angle: float, crank_speed: float, piston_velocity: float, h: A
 
 
 def lowest_pressure(h: Any) -> float:
-    """Lowest pressure of a revolution that the piston would need of the rung *heads* [Pa].
+    """Lowest pressure of a revolution that the piston would need with the rung *heads* [Pa].
 
     Parameters
     ----------
     h : record of dtype HYDRAULIC
-        Of the rung heads.
+        Record with the rung heads.
 
     Returns
     -------
     float
-        Gauge [Pa], at the speed given to :func:`hydraulic_parameters`, with the motion of a crank
-        without clearance. Below ``h["vapour"]`` the liquid would part from the piston: the rung
-        is not valid there, the rung *chamber* is.
+        Gauge pressure at the speed given to :func:`hydraulic_parameters`, for the motion of a crank
+        without clearance. Below ``h["vapour"]`` the liquid would separate from the piston: use the
+        rung *chamber* instead.
 
     Raises
     ------
     ValueError
-        The record is of another rung.
+        The record has another rung.
 
     Examples
     --------

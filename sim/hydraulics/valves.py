@@ -1,4 +1,4 @@
-"""The valves of a chamber: flow through the gap, force on the disc, contact with seat and stop."""
+"""Valves of a chamber: flow through the gap, force on the plate, contact with seat and stop."""
 
 import math
 from typing import Any, NamedTuple
@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from ..jit import kernel
 
-_LAMINAR = 1.0  # Pa: below it a gap is viscous and its flow linear; costs 1 Pa of any drop
+_LAMINAR = 1.0  # Pa: below it a gap is viscous and its flow linear; a loss of 1 Pa at any drop
 
 
 class ValveSide(NamedTuple):
-    """The valves of one side, as one valve."""
+    """Valves of one side, lumped into one."""
 
     gap_conductance: float
     leak_conductance: float
@@ -68,7 +68,7 @@ def discharge_side(h: Any) -> Any:
 
 @kernel
 def touches(lift: float, rate: float, side: Any) -> float:
-    """-1 on the seat, 1 on the stop, 0 free: contact pushes and never pulls."""
+    """Contact: -1 on the seat, 1 on the stop, 0 free; it only pushes."""
     over = lift - side.max_lift
     damped = side.seat_damping * rate
     on_seat = lift < 0.0 and side.seat_stiffness * lift + damped < 0.0
@@ -86,7 +86,7 @@ def seat_force(lift: float, rate: float, contact: float, side: Any) -> float:
 
 @kernel
 def valve_shares(dt: float, side: Any) -> Any:
-    """What of a force becomes rate in an implicit stage, free and in contact; momentum factor."""
+    """Factors from force to rate in an implicit stage, free and in contact; momentum factor."""
     if side.stuck >= 0.0:
         return 0.0, 0.0, 0.0
     per_dt = 1.0 / dt
@@ -99,7 +99,7 @@ def valve_shares(dt: float, side: Any) -> Any:
 def lift_line(lift: float, rate: float, contact: float, shares: Any, side: Any) -> Any:
     """Rate at the end of an implicit stage, as a line over the pressure drop: ``a + b dp``.
 
-    `lift` and `rate` are what the stage starts from; solves ``v = rate + dt F(z, v, dp) / m`` with
+    `lift` and `rate` are the stage's initial values; solves ``v = rate + dt F(z, v, dp) / m`` with
     ``z = lift + dt v``.
     """
     free = rate * shares[2] - side.preload - side.stiffness * lift
@@ -110,7 +110,7 @@ def lift_line(lift: float, rate: float, contact: float, shares: Any, side: Any) 
 
 @kernel
 def _orifice(drop: float) -> Any:
-    """Signed square root of a pressure drop, linear where the flow is laminar; and its slope."""
+    """Signed square root of a pressure drop, linear if the flow is laminar; and its slope."""
     size = abs(drop)
     inverse = 1.0 / math.sqrt(size + _LAMINAR)
     return drop * inverse, inverse * (1.0 - 0.5 * size * inverse * inverse)
@@ -137,7 +137,7 @@ def valve_flow(drop: float, lift: float, dt: float, line: Any, side: Any) -> Any
 
 @kernel
 def flow_now(drop: float, lift: float, rate: float, side: Any) -> float:
-    """Flow through a valve at a known lift, and from its plate's displacement [m^3/s]."""
+    """Flow through a valve at a known lift, including its plate's displacement [m^3/s]."""
     conductance = side.leak_conductance + side.gap_conductance * max(lift, 0.0)
     flow: float = conductance * _orifice(drop)[0] + side.area * rate
     return flow
@@ -160,32 +160,32 @@ def lift_left(
     *,
     after: float = math.radians(20.0),
 ) -> NDArray[np.float64]:
-    """Lift that a valve still has in each of its idle strokes, over its largest lift.
+    """Remaining lift of a valve in each of its idle strokes, over its largest lift.
 
-    A suction valve must be shut while the piston advances, a discharge valve while it withdraws.
-    One whose spring is too soft for the speed is still open some time after the dead centre and
-    then shut by the flow that comes back, with a blow.
+    A suction valve must be closed while the piston advances, a discharge valve while it withdraws.
+    A valve whose spring is too soft for the speed is still open some time after the dead centre,
+    and is then closed by the reversed flow, with an impact.
 
     Parameters
     ----------
     angle : numpy.ndarray [shape=(n,)]
-        Crank angle, rising [rad].
+        Crank angle, increasing [rad].
     lift : numpy.ndarray [shape=(n,)]
-        Of the valve [m], at the same instants.
+        Lift of the valve [m], at the same instants.
     side : str
         ``"suction"`` or ``"discharge"``.
     max_lift : float
-        [m], > 0.
+        Largest lift [m], > 0.
     after : float
         Crank angle after the dead centre at which the idle stroke begins [rad]: 0 gives the lift
-        left at that dead centre, pi the one at the end of the idle stroke, where only a stuck
+        at that dead centre, pi that at the end of the idle stroke, where only a stuck
         valve is open.
 
     Returns
     -------
     numpy.ndarray [shape=(n_cycles,)]
-        One value for each such instant inside the run; 0 where the valve sits on its seat. More
-        than a few per cent, cycle after cycle, is a valve that does not close in time.
+        One value for each such instant in the run; 0 for a closed valve. More than a few
+        per cent, cycle after cycle, means a valve that does not close in time.
 
     Raises
     ------

@@ -1,17 +1,17 @@
-"""Search for the pressures of a suction and a discharge pipe whose flows a pump between them sets.
+"""Solver for the node pressures of a suction and a discharge pipe with a pump between them.
 
-The pump draws from both nodes; what it draws at one depends on the pressure at the other too, and
+The pump draws from both nodes; its flow at one depends on the pressure at the other too, and
 far more steeply than a pipe's flow. A step solves two equations for the two pressures p::
 
     excess_k(p_k, drawn_k(p)) = 0     or  >= 0 at the vapour pressure,   k = suction, discharge
 
-The slopes of the pipes are known, those of the pump are a 2 x 2 matrix G, which is learnt from the
+The slopes of the pipes are known; those of the pump are a 2 x 2 matrix G, which is learnt from the
 trials (Broyden) and kept from step to step. A pump draws more at a node the higher the pressure
-there, less the higher that at the other, and not less if both rise alike: diagonal of G plus
-pipes beats the rest of its row, and a Newton step exists always.
+there, less the higher the other pressure, and not less if both rise equally. So G plus the pipes'
+slopes is diagonally dominant, and a Newton step always exists.
 
-A trial is taken where the sum of both excesses' sizes falls. After two in a row that hardly lessen
-it, G is found anew by probing both pressures; steps that still do not are halved.
+A trial is accepted if the sum of both absolute excesses decreases. After two in a row with little
+progress, G is determined anew by probing both pressures; steps that still fail are halved.
 
 References
 ----------
@@ -30,49 +30,50 @@ from .pipe import excess
 
 PAIR = np.dtype(
     [
-        ("pressure", "f8", 2),  # tried at present [Pa gauge]
+        ("pressure", "f8", 2),  # current trial [Pa gauge]
         ("base", "f8", 2),  # best so far
-        ("base_drawn", "f8", 2),  # what the pump drew there [m^3/s]
+        ("base_drawn", "f8", 2),  # flow drawn by the pump there [m^3/s]
         ("base_gap", "f8", 2),  # excess there [m^3/s]
         ("base_slope", "f8", 2),  # of pipe, spring, gas and valve there [m^3/s/Pa]
-        ("left", "f8"),  # sum of the sizes of both excesses there; infinite before any trial
-        ("pump", "f8", (2, 2)),  # by which the flows drawn rise with the pressures [m^3/s/Pa]
-        ("share", "f8"),  # of a Newton step that is tried
+        ("left", "f8"),  # sum of both absolute excesses there; infinite before any trial
+        ("pump", "f8", (2, 2)),  # derivatives of the flows drawn by the pressures [m^3/s/Pa]
+        ("share", "f8"),  # of the Newton step
         ("phase", "i8"),  # _STEP, _PROBE_FIRST, _PROBE_SECOND or _LAST
-        ("slow", "i8"),  # trials in a row that left too much
+        ("slow", "i8"),  # consecutive trials with too little progress
         ("tries", "i8"),  # in this step
     ]
 )
-"""A search for both pressures; all of it is kept between steps, the matrix for a purpose."""
+"""A search for both pressures; kept between steps, in particular the matrix."""
 
 _STEP, _PROBE_FIRST, _PROBE_SECOND, _LAST = range(4)
 
 MOST_TRIES = 40
-"""Of a search: what the best of them leaves over is booked as volume, and made up for in the next
-steps. Parted columns take three to five in the mean, one step in a hundred ten to forty."""
+"""Most trials of a search. The remaining excess of the best one is booked as volume and
+compensated in the next steps. Parted columns take three to five on average, one step in a hundred
+ten to forty."""
 
-_TOLERANCE = 1e-8  # of the absolute pressure; what is left is booked as volume and made up for
+_TOLERANCE = 1e-8  # of the absolute pressure; the rest is booked as volume and compensated
 
-_NOTABLE = 1e-3  # as the tolerance: what is left over of a step that counts as unsettled
+_NOTABLE = 1e-3  # like the tolerance: remaining excess of a step that counts as unsettled
 
-_PROBE_LEAST, _PROBE_MOST = 1e-7, 1e-5  # of the absolute pressure; flows carry rounding
+_PROBE_LEAST, _PROBE_MOST = 1e-7, 1e-5  # of the absolute pressure, limited by the rounding of flows
 
-_FAST = 0.3  # of what was left over: a trial that leaves less needs no help
+_FAST = 0.3  # of the last excess: a trial that leaves less is good progress
 
-_PATIENCE = 2  # trials that are not fast before both pressures are probed
+_PATIENCE = 2  # slow trials before both pressures are probed
 
-_LEAST_SHARE = 1e-3  # of a Newton step: there is no slope here that would lead on
+_LEAST_SHARE = 1e-3  # of a Newton step: below it no slope helps
 
 
 @kernel
 def begin_pair(pair: Any, pipes: Any, states: Any) -> None:
-    """First pressures to be tried in a step: extrapolated from the means of the last two.
+    """Set the first trial of a step: pressures extrapolated from the last two means.
 
     Parameters
     ----------
     pair : record of dtype PAIR
     pipes : numpy.ndarray [shape=(2,), dtype=PIPE]
-        Suction and discharge.
+        Suction and discharge pipe.
     states : numpy.ndarray [shape=(2,), dtype=PIPE_STATE]
     """
     pair.tries, pair.phase, pair.slow = 0, _STEP, 0
@@ -84,7 +85,7 @@ def begin_pair(pair: Any, pipes: Any, states: Any) -> None:
 
 @kernel
 def _left(p: float, gap: float, slope: float, pipe: Any) -> float:
-    """An excess as the pressure that the pipe alone would be off by, over the absolute one."""
+    """An excess as the pressure error of the pipe alone, over the absolute pressure."""
     if pipe.fixed != 0 or (p <= pipe.vapour and gap >= 0.0):
         return 0.0
     return abs(gap) / ((p + STANDARD_ATMOSPHERE) * slope)
@@ -94,13 +95,13 @@ def _left(p: float, gap: float, slope: float, pipe: Any) -> float:
 def seek_pair(
     pair: Any, suction: float, discharge: float, pipes: Any, states: Any, nodes: Any, h: float
 ) -> bool:
-    """Whether the pressures tried last are those of the nodes; else the next ones are in the pair.
+    """Whether the last trial has converged; otherwise set the next one in the pair.
 
     Parameters
     ----------
     pair : record of dtype PAIR
     suction, discharge : float
-        Flow that the pump draws at both nodes under the pressures tried last [m^3/s].
+        Flow that the pump draws at both nodes in the last trial [m^3/s].
     pipes : numpy.ndarray [shape=(2,), dtype=PIPE]
     states : numpy.ndarray [shape=(2,), dtype=PIPE_STATE]
     nodes : tuple of two numpy.ndarray [shape=(4, n_reaches + 1)]
@@ -162,9 +163,9 @@ def _settle_base(pair: Any, suction: float, discharge: float, left: float) -> No
 
 @kernel
 def _probe(pair: Any, column: int, pipes: Any) -> None:
-    """Ask for the flows with one pressure moved a little, to where the next step would lead.
+    """Set a probe with one pressure changed slightly, in the direction of the next step.
 
-    On the other side of the base a valve may be on its seat, and the slope another.
+    In the other direction a valve may be on its seat, with another slope.
     """
     _newton(pair, pipes)
     absolute = pair.base[column] + STANDARD_ATMOSPHERE
@@ -198,7 +199,7 @@ _TINY = 1e-20  # square of a relative change of pressure that is rounding
 
 @kernel
 def _row(pair: Any, k: int) -> Any:
-    """Slopes of one node's excess over its own pressure and over the other's, signs as they are."""
+    """Slopes of one node's excess for its own pressure and for the other's, with signs."""
     own = max(pair.pump[k, k], 0.0)
     other = min(max(pair.pump[k, 1 - k], -own), 0.0)
     return pair.base_slope[k] + own, other
@@ -213,7 +214,7 @@ def _both(own0: float, other0: float, gap0: float, own1: float, other1: float, g
 
 @kernel
 def _newton(pair: Any, pipes: Any) -> None:
-    """Next trial: a Newton step from the base, neither pressure below that of the vapour."""
+    """Set the next trial: a Newton step from the base, limited to the vapour pressure."""
     pair.phase = _STEP
     own0, other0 = _row(pair, 0)
     own1, other1 = _row(pair, 1)
@@ -240,7 +241,7 @@ def _newton(pair: Any, pipes: Any) -> None:
 
 @kernel
 def _stepped(base: float, step: float, vapour: float) -> float:
-    """Pressure after a step: that of the vapour itself, not nearly, where the step leads to it."""
+    """Pressure after a step; exactly the vapour pressure if the step reaches it."""
     after = base + step
     return after if after > vapour + _ROUNDING * (base - vapour) else vapour
 

@@ -1,18 +1,18 @@
 """One pipe between a far end at constant pressure and a node at the pump, compiled.
 
-The flow Q counts towards the pump, on the discharge side too. A step of length h works with means
+The flow Q is positive towards the pump, on the discharge side too. A step of length h uses means
 over the step: what a pump draws from the node is a volume, the node's pressure p its mean. All
-that the node takes up by itself is a function of p alone, so a step solves one equation for p::
+flows into the node itself are functions of p alone, so a step solves one equation for p::
 
     pipe_flow(p) = q + demand(p) + void / h
 
-with the flow q that the pump draws, what spring, gas and relief valve take (:func:`demand`), and
-the volume of vapour at the node (:func:`excess`). :func:`seek` finds p under a given q; where q
-depends on the pressures of two pipes in turn, :mod:`wearstate.sim.piping.coupling` finds both.
+with the flow q that the pump draws, the flow into spring, gas and relief valve (:func:`demand`),
+and the volume of vapour at the node (:func:`excess`). :func:`seek` finds p for a given q; if q
+depends on the pressures of two pipes, :mod:`wearstate.sim.piping.coupling` finds both.
 
 A pipe is a rigid column with a spring at the node (*lumped-lines*), or carries waves between nodes
-one step of travel apart (*wave-lines*); what is left of its length beside whole reaches is a rigid
-column at the far end, where the pressure does not change and a spring would do nothing.
+one step of travel apart (*wave-lines*); the rest of its length beyond whole reaches is a rigid
+column at the far end, where the pressure is constant and a spring would have no effect.
 """
 
 import math
@@ -26,26 +26,26 @@ from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE, Line, Liquid
 
 PIPE = np.dtype(
     [
-        ("fixed", "i8"),  # 1: nothing between the far end and the node
-        ("reaches", "i8"),  # of one step of travel each; 0: a rigid column alone
-        ("far", "f8"),  # pressure at the far end, brought to the pump's height [Pa]
+        ("fixed", "i8"),  # 1: no pipe between the far end and the node
+        ("reaches", "i8"),  # each one step of travel; 0: only a rigid column
+        ("far", "f8"),  # pressure at the far end, reduced to the pump's height [Pa]
         ("inertance", "f8"),  # of the rigid column [kg/m^4]
         ("far_loss", "f8"),  # of the rigid column and the fittings [Pa s^2/m^6]
         ("impedance", "f8"),  # rho a / A [Pa s/m^3]
         ("reach_loss", "f8"),  # friction of one reach [Pa s^2/m^6]
         ("compliance", "f8"),  # of the spring at the node [m^3/Pa]
-        ("reach_volume", "f8"),  # liquid of one reach [m^3]; of the whole pipe where it has none
+        ("reach_volume", "f8"),  # liquid of one reach [m^3]; of the whole pipe if it has none
         ("gas_volume", "f8"),  # of the damper at rest [m^3]; 0: none
         ("gas_pressure", "f8"),  # at rest, absolute [Pa]
         ("gas_exponent", "f8"),
         ("relief_opens", "f8"),  # [Pa gauge]
-        ("relief_full", "f8"),  # pressure above it at which the valve is fully open [Pa]; 0: none
+        ("relief_full", "f8"),  # pressure rise to the fully open valve [Pa]; 0: none
         ("relief_conductance", "f8"),  # fully open [m^3/s/sqrt(Pa)]
-        ("relief_back", "f8"),  # pressure that it lets out to [Pa]
+        ("relief_back", "f8"),  # pressure behind the relief valve [Pa]
         ("vapour", "f8"),  # [Pa gauge]
     ]
 )
-"""One pipe in SI, as :func:`pipe_parameters` makes it."""
+"""One pipe in SI, from :func:`pipe_parameters`."""
 
 PIPE_STATE = np.dtype(
     [
@@ -54,26 +54,27 @@ PIPE_STATE = np.dtype(
         ("column_mean", "f8"),  # flow of the rigid column over the last step [m^3/s]
         ("column_end", "f8"),  # at its end
         ("gas", "f8"),  # volume in the damper [m^3]
-        ("void", "f8"),  # vapour at the node, and what a step's equation was left open by [m^3]
+        ("void", "f8"),  # vapour at the node, and the remainder of a step's equation [m^3]
         ("drawn", "f8"),  # flow that the pump drew in the last step [m^3/s]
         ("parted", "i8"),  # steps with vapour anywhere in the pipe
-        ("unsettled", "i8"),  # steps whose search ended with more left over than it may
+        ("unsettled", "i8"),  # steps whose search ended with too large an excess
     ]
 )
-"""What one pipe remembers from step to step, beside its inner nodes."""
+"""State of one pipe carried from step to step, in addition to its inner nodes."""
 
 PRESSURE, ARRIVES, LEAVES, VOID = range(4)
-"""Rows of the inner nodes: pressure [Pa], flow that arrives from the far side and that leaves to
+"""Rows of the inner nodes: pressure [Pa], flow arriving from the far side and flow leaving to
 the pump's side [m^3/s], volume of vapour [m^3]; columns from the pump (0) to the far end."""
 
 FEWEST_REACHES = 5
-"""Of a pipe with waves: the first organ-pipe frequency is then within 0.5 %, see the tests."""
+"""Least number of reaches of a pipe: the first organ-pipe frequency is then within 0.5 %, see the
+tests."""
 
 FIRST_MODE = 4 / math.pi**2
 """Share of a pipe's compliance that is lumped at its closed end: with it, and the whole inertance,
-the first organ-pipe frequency a / 4 L is exact. Deformed as in statics it would be 1/3."""
+the first organ-pipe frequency a / 4 L is exact. The static deformation would give 1/3."""
 
-_STEEPEST_FALL = 0.1  # of the mean pressure: the least that a damper's gas is extrapolated to
+_STEEPEST_FALL = 0.1  # of the mean pressure: least pressure to which a damper's gas is extrapolated
 
 
 # --- parameters
@@ -93,16 +94,16 @@ def pipe_parameters(
     Parameters
     ----------
     line : Line
-        With its wave speed.
+        Line with a wave speed.
     liquid : Liquid
     far : float
-        Pressure at the far end, brought to the height of the pump [Pa gauge].
+        Pressure at the far end, reduced to the height of the pump [Pa gauge].
     relief_back : float
-        Pressure that a relief valve lets out to [Pa gauge].
+        Pressure behind a relief valve [Pa gauge].
     step : float
-        [s]
+        Step [s].
     waves : bool
-        Waves between the ends; else a column on a spring.
+        Waves between the ends; if false, a column on a spring.
 
     Returns
     -------
@@ -116,14 +117,14 @@ def pipe_parameters(
     (3, 1.0)
     """
     speed = line.wave_speed
-    assert speed is not None  # the scene has seen to it
+    assert speed is not None  # ensured by the scene
     area = math.pi / 4 * line.diameter**2
     dynamic = 0.5 * liquid.density / area**2
     reaches = math.floor(line.length / (speed * step) * (1 + _ROUNDING)) if waves else 0
     left = max(0.0, line.length - reaches * speed * step)
     if left < _ROUNDING * line.length:
         left = 0.0
-    friction = dynamic * line.friction_factor / line.diameter  # of a metre
+    friction = dynamic * line.friction_factor / line.diameter  # per metre
     whole = line.length * area / (liquid.density * speed**2)
     values = {
         "reaches": reaches,
@@ -145,7 +146,7 @@ def pipe_parameters(
     return record
 
 
-_ROUNDING = 1e-9  # of a number of reaches that would be whole
+_ROUNDING = 1e-9  # tolerance for a whole number of reaches
 
 
 def _damper_values(line: Line, far: float) -> dict[str, float]:
@@ -172,26 +173,26 @@ def _relief_values(line: Line, liquid: Liquid, back: float) -> dict[str, float]:
 
 
 def steady_pressure(pipe: Any, flow: float) -> float:
-    """Pressure at the node under a steady flow [Pa].
+    """Pressure at the node at a steady flow [Pa].
 
     Parameters
     ----------
     pipe : record of dtype PIPE
     flow : float
-        Towards the pump [m^3/s].
+        Flow towards the pump [m^3/s].
     """
     loss = float(pipe["far_loss"] + pipe["reaches"] * pipe["reach_loss"])
     return float(pipe["far"]) - loss * flow * abs(flow)
 
 
 def pipe_start(pipe: Any, flow: float) -> tuple[NDArray[np.void], NDArray[np.float64]]:
-    """State of a pipe that carries a steady flow.
+    """State of a pipe with a steady flow.
 
     Parameters
     ----------
     pipe : record of dtype PIPE
     flow : float
-        Towards the pump [m^3/s].
+        Flow towards the pump [m^3/s].
 
     Returns
     -------
@@ -216,7 +217,7 @@ def pipe_start(pipe: Any, flow: float) -> tuple[NDArray[np.void], NDArray[np.flo
 
 @kernel
 def gas_volume(pressure: float, pipe: Any) -> float:
-    """Volume of the damper's gas at an absolute pressure [m^3]; 0 where there is none."""
+    """Volume of the damper's gas at an absolute pressure [m^3]; 0 without gas."""
     if pipe.gas_volume == 0.0:
         return 0.0
     volume: float = pipe.gas_volume * (pipe.gas_pressure / pressure) ** (1.0 / pipe.gas_exponent)
@@ -225,16 +226,16 @@ def gas_volume(pressure: float, pipe: Any) -> float:
 
 @kernel
 def _column(drive: float, back: float, loss: float) -> Any:
-    """Flow of ``back Q + loss Q |Q| = drive``, and its slope over the drive."""
+    """Flow of ``back Q + loss Q |Q| = drive``, and its derivative by the drive."""
     root = math.sqrt(back * back + 4.0 * loss * abs(drive))
     return 2.0 * drive / (back + root), 1.0 / root
 
 
 @kernel
 def _column_drive(pipe: Any, state: Any, h: float) -> Any:
-    """What a rigid column's inertia adds to its driving pressure, and what holds its flow back.
+    """Inertia terms of a rigid column: added driving pressure, and resistance to its flow.
 
-    ``I (Q_end - Q_begin) / h``, the flow at the end extrapolated from the means of two steps.
+    ``I (Q_end - Q_begin) / h``, with the flow at the end extrapolated from the means of two steps.
     """
     per_step = pipe.inertance / h
     return per_step * (0.5 * state.column_mean + state.column_end), 1.5 * per_step
@@ -247,9 +248,9 @@ def pipe_flow(p: float, pipe: Any, state: Any, nodes: Any, h: float) -> Any:
     Parameters
     ----------
     p : float
-        [Pa gauge]
+        Mean pressure [Pa gauge].
     pipe : record of dtype PIPE
-        Not fixed.
+        Pipe that is not fixed.
     state : record of dtype PIPE_STATE
     nodes : numpy.ndarray [shape=(4, n_reaches + 1)]
     h : float
@@ -271,14 +272,14 @@ def pipe_flow(p: float, pipe: Any, state: Any, nodes: Any, h: float) -> Any:
 
 @kernel
 def _end(p: float, state: Any) -> float:
-    """Pressure at the end of the step, from its mean and that of the step before."""
+    """Pressure at the end of the step, from its mean and that of the last step."""
     end: float = 1.5 * p - 0.5 * state.mean
     return end
 
 
 @kernel
 def _gas_end(p: float, state: Any) -> Any:
-    """The same, absolute, for a gas, which has no pressure below zero; and its slope."""
+    """The same, absolute, for a gas, whose pressure stays positive; and its slope."""
     absolute, least = _end(p, state) + STANDARD_ATMOSPHERE, p + STANDARD_ATMOSPHERE
     if absolute >= _STEEPEST_FALL * least:
         return absolute, 1.5
@@ -287,7 +288,7 @@ def _gas_end(p: float, state: Any) -> Any:
 
 @kernel
 def demand(p: float, pipe: Any, state: Any, h: float) -> Any:
-    """Flow that spring, damper and relief valve of the node take up, and its slope.
+    """Flow into spring, damper and relief valve of the node, and its slope.
 
     Parameters
     ----------
@@ -321,7 +322,7 @@ def demand(p: float, pipe: Any, state: Any, h: float) -> Any:
 
 @kernel
 def excess(p: float, drawn: float, pipe: Any, state: Any, nodes: Any, h: float) -> Any:
-    """By what more is taken from the node than reaches it, vapour included, and its slope.
+    """Outflow of the node in excess of its inflow, including vapour, and its slope.
 
     Parameters
     ----------
@@ -330,13 +331,13 @@ def excess(p: float, drawn: float, pipe: Any, state: Any, nodes: Any, h: float) 
     drawn : float
         Flow that the pump draws [m^3/s].
     pipe, state, nodes, h
-        As of :func:`pipe_flow`.
+        As in :func:`pipe_flow`.
 
     Returns
     -------
     flow, slope : float
-        [m^3/s], [m^3/s/Pa]; it rises with p. Zero at the node's pressure; where it is positive at
-        the vapour pressure already, h times it is the volume of the vapour.
+        [m^3/s], [m^3/s/Pa]; it rises with p. Zero at the node's pressure; if it is positive even at
+        the vapour pressure, h times it is the volume of vapour.
     """
     arrives, per_arrival = pipe_flow(p, pipe, state, nodes, h)
     taken, per_taken = demand(p, pipe, state, h)
@@ -345,32 +346,33 @@ def excess(p: float, drawn: float, pipe: Any, state: Any, nodes: Any, h: float) 
 
 @kernel
 def _settled(p: float, gap: float, slope: float, pipe: Any) -> bool:
-    """Whether an excess is small enough, as the pressure that the pipe alone would be off by."""
+    """Whether an excess is small enough, as the pressure error of the pipe alone."""
     if p <= pipe.vapour and gap >= 0.0:
         return True
     return abs(gap) <= _TOLERANCE * (p + STANDARD_ATMOSPHERE) * slope
 
 
-_TOLERANCE = 1e-8  # of the absolute pressure; what is left is booked as volume and made up for
+_TOLERANCE = 1e-8  # of the absolute pressure; the rest is booked as volume and compensated
 
 
 SEARCH = np.dtype(
     [
-        ("pressure", "f8"),  # tried at present [Pa gauge]
-        ("low", "f8"),  # excess was negative there
-        ("high", "f8"),  # excess was positive there
+        ("pressure", "f8"),  # current trial [Pa gauge]
+        ("low", "f8"),  # negative excess there
+        ("high", "f8"),  # positive excess there
         ("tries", "i8"),  # in this step
     ]
 )
-"""A search for the pressure of a node under a given flow."""
+"""A search for the pressure of a node at a given flow."""
 
 MOST_TRIES = 40
-"""Of a search: what is then left over is booked as volume, and made up for in the next steps."""
+"""Largest number of trials; the remaining excess is booked as volume and compensated in the next
+steps."""
 
 
 @kernel
 def begin_search(search: Any, pipe: Any, state: Any) -> None:
-    """First pressure to be tried in a step: extrapolated from the means of the last two.
+    """Set the first trial of a step: pressure extrapolated from the last two means.
 
     Parameters
     ----------
@@ -386,7 +388,7 @@ def begin_search(search: Any, pipe: Any, state: Any) -> None:
 
 @kernel
 def seek(search: Any, drawn: float, pipe: Any, state: Any, nodes: Any, h: float) -> bool:
-    """Whether the pressure tried last is that of the node; else the next one is in the search.
+    """Whether the last trial has converged; otherwise set the next one in the search.
 
     Parameters
     ----------
@@ -394,11 +396,11 @@ def seek(search: Any, drawn: float, pipe: Any, state: Any, nodes: Any, h: float)
     drawn : float
         Flow that the pump draws [m^3/s].
     pipe, state, nodes, h
-        As of :func:`pipe_flow`.
+        As in :func:`pipe_flow`.
 
     Notes
     -----
-    Newton, kept inside what was tried.
+    Newton's method inside the bracket of earlier trials.
     """
     if pipe.fixed != 0:
         return True
@@ -424,12 +426,12 @@ def seek(search: Any, drawn: float, pipe: Any, state: Any, nodes: Any, h: float)
 
 @kernel
 def advance_pipe(p: float, drawn: float, pipe: Any, state: Any, nodes: Any, h: float) -> None:
-    """Advance a pipe over a step.
+    """Advance a pipe by one step.
 
     Parameters
     ----------
     p : float
-        Mean pressure of its node [Pa gauge], where :func:`excess` is zero, or that of the vapour.
+        Mean pressure of its node [Pa gauge], where :func:`excess` is zero, or the vapour pressure.
     drawn : float
         Flow that the pump drew [m^3/s].
     pipe : record of dtype PIPE
@@ -437,17 +439,18 @@ def advance_pipe(p: float, drawn: float, pipe: Any, state: Any, nodes: Any, h: f
     nodes : numpy.ndarray [shape=(4, n_reaches + 1)]
         Both are replaced by those at the end of the step.
     h : float
-        [s]
+        Step [s].
 
     Notes
     -----
     Between nodes the method of characteristics: along ``dx/dt = -+a``, with a reach of one step,
-    ``p +- Z Q`` is kept but for friction ``R Q |Q'|``, implicit in Q [1]_. What leaves a node less
-    what arrives is vapour where the pressure would fall below its own, a discrete cavity [1]_. Its
-    volume and all others are kept to rounding.
+    ``p +- Z Q`` is constant except for friction ``R Q |Q'|``, implicit in Q [1]_. If the pressure
+    would fall below the vapour pressure, the difference of outflow and inflow of a node is vapour,
+    a discrete cavity [1]_. Its volume and all others are conserved to rounding.
 
-    Column, spring and gas take BDF2 in such a form that the volumes close: the mean of a step is
-    two thirds of its end and one of the mean before. Damped as ``(omega h)^3 / 4`` of the critical.
+    Column, spring and gas use BDF2 in a form that conserves the volumes: the mean of a step is
+    two thirds of its end and one third of the last mean. The numerical damping is ``(omega h)^3 /
+    4`` of critical.
 
     References
     ----------
@@ -485,9 +488,9 @@ def _advance_column(flow: float, state: Any) -> None:
 
 @kernel
 def _advance_nodes(p: float, arrives: float, pipe: Any, state: Any, nodes: Any, h: float) -> bool:
-    """One sweep from the pump to the far end; what a node had before is kept for the next one.
+    """One sweep from the pump to the far end; old values are kept for the next node.
 
-    True where a node holds vapour.
+    Returns whether a node holds vapour.
     """
     parted = False
     z, loss, n = pipe.impedance, pipe.reach_loss, pipe.reaches
@@ -503,7 +506,7 @@ def _advance_nodes(p: float, arrives: float, pipe: Any, state: Any, nodes: Any, 
         if own >= pipe.vapour:
             nodes[PRESSURE, i], nodes[VOID, i] = own, 0.0
             nodes[ARRIVES, i] = (from_far - own) / down
-            # what a closing cavity swallows; else the same to rounding
+            # inflow into a closing cavity; otherwise the same to rounding
             nodes[LEAVES, i] = (own - from_near) / up if void > 0.0 else nodes[ARRIVES, i]
         else:
             own = pipe.vapour
@@ -530,18 +533,18 @@ def drive_pipe(
     pressure: NDArray[np.float64],
     entering: NDArray[np.float64],
 ) -> None:
-    """March one pipe under a given flow at its node.
+    """March one pipe with a given flow at its node.
 
     Parameters
     ----------
     pipes : numpy.ndarray [shape=(1,), dtype=PIPE]
     states : numpy.ndarray [shape=(1,), dtype=PIPE_STATE]
-        As :func:`pipe_start` makes it; replaced by that at the end, with `nodes`.
+        From :func:`pipe_start`; replaced by the final state, like `nodes`.
     nodes : numpy.ndarray [shape=(4, n_reaches + 1)]
     drawn : numpy.ndarray [shape=(n_steps,)]
         Flow that the pump draws, means over the steps [m^3/s].
     h : float
-        [s]
+        Step [s].
     pressure, entering : numpy.ndarray [shape=(n_steps,)]
         Filled with the node's pressure [Pa gauge] and the flow at the far end [m^3/s], means.
 

@@ -1,8 +1,8 @@
-"""Archard wear: the volume that sliding contact takes, where it takes it, and grades of the result.
+"""Archard wear: worn volume of a sliding contact, its distribution, and wear grades.
 
 The worn volume is ``V = k int |F| |v| dt`` with the specific wear rate k [m^2/N, that is m^3 per N
-and m of sliding], however the pressure is spread: 1 mm^3/(N m) is 1e-9 m^2/N. How it is spread says
-where the surface is lowered.
+and m of sliding], for any distribution of pressure: 1 mm^3/(N m) is 1e-9 m^2/N. The distribution
+determines where the surface is lowered.
 
 Sources: Archard (1953), "Contact and rubbing of flat surfaces", J. Applied Physics 24, 981-988,
 doi:10.1063/1.1721448; Mukras, Kim, Mauntler, Schmitz, Sawyer (2010), "Comparison between elastic
@@ -20,10 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 Float = NDArray[np.float64]
 
 WEAR_RATE_MOST = 1e-9
-"""[m^2/N], 1 mm^3/(N m): dry metal galls at 1e-11. A number above it has another unit."""
+"""Largest specific wear rate [m^2/N], 1 mm^3/(N m): dry metal galls at 1e-11. A larger number has
+another unit."""
 
 ANGLES = 360
-"""Places round the circumference of a scar, unless told otherwise."""
+"""Default number of positions round the circumference of a scar."""
 
 
 def grade(clearance: float, edges: Sequence[float]) -> int:
@@ -32,7 +33,7 @@ def grade(clearance: float, edges: Sequence[float]) -> int:
     Parameters
     ----------
     clearance : float
-        [m], radial or diametral as `edges` are.
+        Clearance [m], radial or diametral like `edges`.
     edges : sequence of float
         Rising clearances [m] at which grades 1, 2, 3 begin; a clearance on an edge has the
         higher grade.
@@ -66,11 +67,11 @@ def sliding_work(force: ArrayLike, speed: ArrayLike, step: float) -> float:
     Parameters
     ----------
     force : array_like [shape=(n,)]
-        Normal force, means over equal steps [N]; its sign does not matter.
+        Normal force, means over equal steps [N]; the sign is ignored.
     speed : array_like [shape=(n,)]
-        Sliding speed, means over the same steps [m/s]; neither does its.
+        Sliding speed, means over the same steps [m/s]; the sign is ignored.
     step : float
-        Of time [s].
+        Time step [s].
 
     Returns
     -------
@@ -95,14 +96,14 @@ def sliding_work(force: ArrayLike, speed: ArrayLike, step: float) -> float:
 
 
 def wear_volume(wear_rate: float, work: float) -> float:
-    """Volume worn off by sliding, after Archard.
+    """Worn volume from sliding, after Archard.
 
     Parameters
     ----------
     wear_rate : float
         Specific wear rate k [m^2/N], 0 <= k <= 1e-9.
     work : float
-        Of :func:`sliding_work` [N m], >= 0.
+        Result of :func:`sliding_work` [N m], >= 0.
 
     Returns
     -------
@@ -112,11 +113,11 @@ def wear_volume(wear_rate: float, work: float) -> float:
     Raises
     ------
     ValueError
-        Rate or work is out of range, all faults at once.
+        Rate or work is out of range; all faults together.
 
     Notes
     -----
-    Holds for sliding wear that is mild and steady; not for scuffing, nor for wear by impact.
+    Valid for mild, steady sliding wear; not for scuffing or impact wear.
 
     Examples
     --------
@@ -148,18 +149,18 @@ def scar_shape(
     bed_half_angle: float = math.pi / 2,
     n_angles: int = ANGLES,
 ) -> Float:
-    """Where on a round surface the wear is: its share per radian of circumference.
+    """Distribution of wear on a round surface: its share per radian of circumference.
 
     Parameters
     ----------
     direction : array_like [shape=(n,)]
-        Of the contact, in a frame that turns with the surface [rad].
+        Direction of the contact, in a frame that rotates with the surface [rad].
     work : array_like [shape=(n,)]
-        Wear at each of them, in any unit, >= 0.
+        Wear in each direction, in any unit, >= 0.
     bed_half_angle : float
-        Half the arc on which the surfaces touch, in (0, pi/2] [rad].
+        Half the arc of contact, in (0, pi/2] [rad].
     n_angles : int
-        Places round the circumference, >= 8.
+        Positions round the circumference, >= 8.
 
     Returns
     -------
@@ -170,12 +171,12 @@ def scar_shape(
     Raises
     ------
     ValueError
-        There is no wear, or bed or places are out of range; all faults at once.
+        There is no wear, or an argument is out of range; all faults together.
 
     Notes
     -----
-    The pressure falls as a cosine from the direction of the force to the ends of the bed, as in a
-    bush that has run in on its pin and lies in its own bed. What it is does not touch the volume.
+    The pressure decreases as a cosine from the direction of the force to the ends of the bed, as in
+    a bush run in on its pin. The distribution does not affect the volume.
 
     Examples
     --------
@@ -192,7 +193,7 @@ def scar_shape(
     _refuse_scar(weight, bed_half_angle, n_angles)
     place = np.mod(np.asarray(direction, dtype=float) * n_angles / math.tau, n_angles)
     below = np.floor(place).astype(np.intp)
-    upper = place - below  # share of the neighbour: nothing jumps from bin to bin
+    upper = place - below  # share of the neighbour: no jumps between bins
     loaded = np.bincount(below % n_angles, weight * (1 - upper), n_angles)
     loaded += np.bincount((below + 1) % n_angles, weight * upper, n_angles)
     bed = _bed(bed_half_angle, n_angles)
@@ -202,7 +203,7 @@ def scar_shape(
 
 
 def _bed(half_angle: float, n_angles: int) -> Float:
-    """Share of the pressure at every place, for a force along the first."""
+    """Share of the pressure at every position, for a force along the first."""
     turn = np.arange(n_angles)
     away = math.tau * np.minimum(turn, n_angles - turn) / n_angles
     inside = away < half_angle
@@ -222,20 +223,20 @@ def _refuse_scar(work: Float, bed_half_angle: float, n_angles: int) -> None:
 
 
 def widening(shape: Float, radius: float, width: float) -> float:
-    """Diametral clearance gained per volume, measured where most is gained.
+    """Diametral clearance gained per volume, at the position of the largest gain.
 
     Parameters
     ----------
     shape : numpy.ndarray [shape=(n_angles,)]
-        Of :func:`scar_shape`, an even number of places.
+        Result of :func:`scar_shape`, with an even number of positions.
     radius, width : float
-        Of the surface [m].
+        Dimensions of the surface [m].
 
     Returns
     -------
     float
-        Play gained along the best worn diameter over the volume [1/m^2]: 1 over pi times radius
-        times width for even wear, at most pi/2 times that in a bed of half a turn.
+        Clearance gained along the most worn diameter over the volume [1/m^2]: 1 over pi times
+        radius times width for uniform wear, at most pi/2 times that in a bed of half a turn.
 
     Examples
     --------
@@ -251,16 +252,16 @@ def widening(shape: Float, radius: float, width: float) -> float:
 
 
 def dufrane_volume(depth: float, clearance: float, radius: float, width: float) -> float:
-    """Volume of the scar that a shaft wears in the shape of its own circle.
+    """Volume of a scar with the shape of the shaft's circle.
 
     Parameters
     ----------
     depth : float
         Deepest wear [m], >= 0 and below twice the clearance.
     clearance : float
-        Radial, of the bore where it is not worn [m].
+        Radial clearance of the unworn bore [m].
     radius, width : float
-        Of the bore [m].
+        Dimensions of the bore [m].
 
     Returns
     -------
@@ -294,14 +295,14 @@ def dufrane_volume(depth: float, clearance: float, radius: float, width: float) 
 
 
 def _segment(half: float) -> float:
-    """Half the scar's cross-section over radius times clearance, by half its angle [rad]."""
+    """Half the scar's cross-section over radius times clearance, from half its angle [rad]."""
     if half < _SHALLOW:
         return half**3 / 3 * (1 - half**2 / 10 + half**4 / 280)
     return math.sin(half) - math.cos(half) * half
 
 
 _SHALLOW = 0.03
-"""Below, the difference loses digits; the series leaves out less than 1e-13 of itself."""
+"""Below, the difference loses digits; the series' relative error is less than 1e-13."""
 
 
 def dufrane_depth(volume: float, clearance: float, radius: float, width: float) -> float:
@@ -310,19 +311,19 @@ def dufrane_depth(volume: float, clearance: float, radius: float, width: float) 
     Parameters
     ----------
     volume : float
-        [m^3], >= 0.
+        Volume [m^3], >= 0.
     clearance, radius, width : float
-        As there [m].
+        As in :func:`dufrane_volume` [m].
 
     Returns
     -------
     float
-        At the deepest place [m].
+        Depth at the deepest position [m].
 
     Raises
     ------
     ValueError
-        No scar is as large.
+        The volume exceeds that of the largest scar.
 
     Examples
     --------
@@ -338,7 +339,7 @@ def dufrane_depth(volume: float, clearance: float, radius: float, width: float) 
         )
     low, high = 0.0, math.pi
     share = volume / (2 * radius * width * clearance)
-    for _ in range(_HALVINGS):  # of the half angle, where the volume is smooth and rises
+    for _ in range(_HALVINGS):  # of the half angle: the volume is a smooth, rising function of it
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _segment(middle) < share else (low, middle)
     return 2 * clearance * math.sin(0.25 * (low + high)) ** 2

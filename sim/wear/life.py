@@ -1,9 +1,9 @@
-"""A joint over its life: wear at a rate that follows the clearance, running in, maintenance.
+"""A joint over its life: wear at a rate that depends on the clearance, running in, maintenance.
 
 Worn volume grows as ``dV/dt = k r(t) P(V)`` with the specific wear rate k, the sliding power P at
-the clearance of the moment, and ``r = 1 + a exp(-t / t_r)`` while a new surface runs in. P is
+the present clearance, and ``r = 1 + a exp(-t / t_r)`` while a new surface runs in. P is
 tabulated and linear between its knots, so that the equation has a closed form: no time step, and
-no error but that of the table, which falls with the square of the knots' distance.
+no error except that of the table, which falls with the square of the knots' distance.
 """
 
 import math
@@ -20,26 +20,26 @@ from scipy.special import lambertw
 from .archard import Float
 
 MOST_EVENTS = 10_000
-"""Of one history: a machine that is mended more often wears by the hour."""
+"""Most events of one history: a machine repaired more often wears out within hours."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WearLaw:
-    """How fast a joint wears against how much it has worn.
+    """Wear speed of a joint as a function of its wear.
 
     Attributes
     ----------
     volume : numpy.ndarray [shape=(n,)]
         Worn volume at the knots [m^3], rising.
     power : numpy.ndarray [shape=(n,)]
-        Contact force times sliding speed there, mean over operation [W], > 0.
+        Contact force times sliding speed at the knots, mean over operation [W], > 0.
     severity_of, volume_of : callable
         From worn volume to severity [m], and back.
 
     Raises
     ------
     ValueError
-        The knots do not rise, or nothing slides at one of them; all faults at once.
+        The knots do not rise, or there is no sliding at one of them; all faults together.
 
     Examples
     --------
@@ -61,26 +61,26 @@ class WearLaw:
     volume_of: Callable[[float], float]
 
     def __post_init__(self) -> None:
-        """Refuse what has no solution."""
+        """Refuse a law without a solution."""
         faults = []
         if self.volume.size < 2 or not (np.diff(self.volume) > 0).all():
             faults.append(f"volume = {_few(self.volume)} m^3 must be two or more that rise")
         if not (np.isfinite(self.power).all() and (self.power > 0).all()):
             faults.append(
-                f"power = {_few(self.power)} W must be > 0 at every knot; a joint in which nothing "
-                "slides has no life to simulate: load it, or end at a smaller severity"
+                f"power = {_few(self.power)} W must be > 0 at every knot; a joint without "
+                "sliding has no life to simulate: load it, or end at a smaller severity"
             )
         if faults:
             raise ValueError("; ".join(faults))
 
     def work(self, volume: float) -> float:
-        """``k int r dt`` from the first knot up to a volume [m^2 s/N]."""
+        """``k int r dt`` from the first knot to a volume [m^2 s/N]."""
         i = self._segment(self.volume, volume)
         below, power = volume - self.volume[i], self.power[i]
         return float(self._ticks[i] + below / power * _log1p_over(self._slopes[i] * below / power))
 
     def grown(self, volume: float, work: float) -> float:
-        """Volume after so much more ``k int r dt`` [m^3]; the table's end goes straight on."""
+        """Volume after additional ``k int r dt`` [m^3]; extrapolated linearly beyond the table."""
         reached = self.work(volume) + work
         i = self._segment(self._ticks, reached)
         after = reached - self._ticks[i]
@@ -107,7 +107,7 @@ class WearLaw:
         return np.concatenate([[0.0], np.cumsum(parts)])
 
     def _segment(self, knots: Float, value: float) -> int:
-        """Knot that a value lies behind; those at the ends reach on."""
+        """Index of the knot before a value; the end segments extend beyond the table."""
         return min(max(bisect_right(knots, value) - 1, 0), len(knots) - 2)
 
 
@@ -127,14 +127,14 @@ def _expm1_over(x: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class RunningIn:
-    """A new surface wears faster by ``excess * exp(-t / time)``.
+    """Faster wear of a new surface, by ``excess * exp(-t / time)``.
 
     Attributes
     ----------
     excess : float
-        Over the steady rate at first [-], 0 <= excess <= 100.
+        Initial excess over the steady rate [-], 0 <= excess <= 100.
     time : float
-        In which it falls to 1/e of that [s], > 0.
+        Time in which the excess falls to 1/e [s], > 0.
     """
 
     excess: float = 0.0
@@ -151,31 +151,31 @@ class RunningIn:
             raise ValueError("; ".join(faults))
 
     def equivalent(self, age: float) -> float:
-        """Steady time that wears as much as the first `age` of a surface [s]."""
+        """Time at the steady rate with the same wear as the first `age` of a surface [s]."""
         return age - self.excess * self.time * math.expm1(-age / self.time)
 
     def age(self, equivalent: float) -> float:
-        """Age of a surface by that steady time: the inverse, by Lambert's function [s]."""
+        """Age of a surface from that steady time: the inverse, by Lambert's function [s]."""
         rest = equivalent / self.time - self.excess
         return self.time * (rest + float(lambertw(self.excess * math.exp(-rest)).real))
 
 
-_EXCESS_MOST = 100.0  # a surface that wears a hundred times faster is not run in but ruined
+_EXCESS_MOST = 100.0  # a surface that wears a hundred times faster is not running in but failing
 
 
 @dataclass(frozen=True, kw_only=True)
 class Maintenance:
-    """What is done to a joint, and when.
+    """Maintenance of a joint: action and interval.
 
     Attributes
     ----------
     restores : float
-        Share of the worn volume that it takes back, 0 < share <= 1; 1 is a renewal: a new surface
+        Share of the worn volume that it restores, 0 < share <= 1; 1 is a renewal: a new surface
         with a clearance of its own, which runs in again.
     every : float or None
-        Operating time between two, counted from the machine's first start [s].
+        Operating time between two actions, counted from the machine's first start [s].
     at : float or None
-        Severity at which it is due [m]. Give one of the two.
+        Severity at which the action is due [m]. Give one of the two.
     """
 
     restores: float
@@ -196,31 +196,31 @@ class Maintenance:
 
 
 class _Piece(NamedTuple):
-    """A stretch of operation between two events."""
+    """A period of operation between two events."""
 
     begin: float  # [s]
-    volume: float  # at its begin [m^3]
+    volume: float  # at its start [m^3]
     as_new: float  # volume when the surface was new [m^3]
-    born: float  # when the surface was new [s]
+    born: float  # start of the surface's life [s]
     events: int  # before it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LifeHistory:
-    """Wear of one machine against operating time; of :func:`life_history`.
+    """Wear of one machine over operating time; from :func:`life_history`.
 
     Attributes
     ----------
     law : WearLaw
     wear_rate : float
-        Of this machine [m^2/N].
+        Specific wear rate of this machine [m^2/N].
     running_in : RunningIn
     pieces : tuple
-        Stretches between events, the first from the start on.
+        Periods between events, from the start on.
     crossings : tuple of float
         Times at which the limit is reached from below [s].
     limit : float
-        Severity that condemns [m].
+        Condemning severity [m].
     """
 
     law: WearLaw
@@ -239,36 +239,36 @@ class LifeHistory:
         return self.law.severity_of(self.volume(time))
 
     def rate(self, time: float) -> float:
-        """Volume worn off in a second [m^3/s]."""
+        """Rate of wear by volume [m^3/s]."""
         age = time - self._piece(time).born
         fresh = 1 + self.running_in.excess * math.exp(-age / self.running_in.time)
         return self.wear_rate * fresh * self.law.power_at(self.volume(time))
 
     def events(self, time: float) -> int:
-        """Maintenance and renewals so far."""
+        """Number of repairs and renewals so far."""
         return self._piece(time).events
 
     def remaining(self, time: float) -> float:
         """Operating time until the limit is next reached [s].
 
-        0 at the limit and beyond it; NaN where the policy keeps the machine from it for as long as
-        the history was looked ahead.
+        0 at and beyond the limit; NaN if maintenance keeps the machine below it throughout the
+        period that was looked ahead.
         """
         if self.severity(time) >= self.limit:
             return 0.0
         return next((cross - time for cross in self.crossings if cross >= time), math.nan)
 
     def share(self, time: float) -> float:
-        """Age of the surface over the age at which it is renewed, as planned or broken [-].
+        """Age of the surface over its age at the next renewal, planned or after failure [-].
 
-        NaN where no renewal was met in looking ahead.
+        NaN if no renewal occurs in the period that was looked ahead.
         """
         born = self._piece(time).born
         renewed = next((piece.born for piece in self.pieces if piece.born > time), math.nan)
         return (time - born) / (renewed - born)
 
     def event_times(self) -> tuple[float, ...]:
-        """When something was done [s]."""
+        """Times of maintenance and renewals [s]."""
         return tuple(piece.begin for piece in self.pieces[1:])
 
     def _piece(self, time: float) -> _Piece:
@@ -288,29 +288,29 @@ def life_history(
     maintenance: Sequence[Maintenance] = (),
     ahead: float = 10.0,
 ) -> LifeHistory:
-    """Wear of one machine over its life, with what is done to it.
+    """Wear of one machine over its life, including maintenance.
 
     Parameters
     ----------
     law : WearLaw
-        Of the joint.
+        Law of the joint.
     wear_rate : float
         Specific wear rate of this machine [m^2/N], >= 0.
     as_new : iterable of float
-        Severity of the first surface and of those that follow it [m]; as many as are needed.
+        Severity of the first surface and of the following ones [m]; as many as needed.
     limit : float
-        Severity that condemns [m].
+        Condemning severity [m].
     end : float
         Severity at which the joint fails and is renewed [m], >= limit.
     until : float
-        Operating time that is wanted [s], > 0.
+        Operating time to cover [s], > 0.
     running_in : RunningIn, optional
-        None: new surfaces wear as old ones.
+        None: new surfaces wear like old ones.
     maintenance : sequence of Maintenance
-        The policy; of several due at once all are done in this order.
+        Maintenance rules; several due together are all applied in this order.
     ahead : float
-        Over `until`: how far the policy is followed to find when the limit is next reached and when
-        the surface is next renewed, >= 1.
+        Over `until`: period for which maintenance is simulated to find when the limit is next
+        reached and the surface next renewed, >= 1.
 
     Returns
     -------
@@ -319,7 +319,7 @@ def life_history(
     Raises
     ------
     ValueError
-        Bounds are in the wrong order, or there are more than 10,000 events; all faults at once.
+        Bounds are in the wrong order, or there are more than 10,000 events; all faults together.
 
     Examples
     --------
@@ -355,7 +355,7 @@ def life_history(
 
 
 class _Plan(NamedTuple):
-    """What a history follows from."""
+    """Input of a history."""
 
     law: WearLaw
     wear_rate: float
@@ -392,7 +392,7 @@ def _refuse_life(
 
 
 def _pieces(plan: _Plan, limit: float, until: float, horizon: float) -> Iterator[_Piece]:
-    """Stretches until all is known about the time wanted, or the horizon is met."""
+    """Periods until everything in the requested time is known, or the horizon is reached."""
     new = plan.law.volume_of(next(plan.as_new))
     piece = _Piece(begin=0.0, volume=new, as_new=new, born=0.0, events=0)
     crossed = renewed = False
@@ -409,7 +409,7 @@ def _pieces(plan: _Plan, limit: float, until: float, horizon: float) -> Iterator
                 f"maintenance = {MOST_EVENTS} events by {time:.3g} s, must be fewer; renew less "
                 "often, or lower the wear rate"
             )
-        piece = _mended(plan, piece, time, rules)
+        piece = _after_event(plan, piece, time, rules)
         if crossed and renewed:
             yield piece
             return
@@ -419,7 +419,7 @@ _RENEWAL = Maintenance(restores=1.0, every=math.inf)  # after a failure
 
 
 def _next_event(plan: _Plan, piece: _Piece) -> tuple[float, list[Maintenance]]:
-    """When something is done next, and what; never is infinity."""
+    """Time and actions of the next event; infinity for none."""
     due = [(_reached(plan, piece, plan.law.volume_of(plan.end)), _RENEWAL)]
     for rule in plan.maintenance:
         if rule.at is not None:
@@ -431,11 +431,11 @@ def _next_event(plan: _Plan, piece: _Piece) -> tuple[float, list[Maintenance]]:
     return time, [rule for when, rule in due if when <= time * (1 + _ROUNDING)]
 
 
-_ROUNDING = 1e-12  # of a time: what is due together is done together
+_ROUNDING = 1e-12  # of a time: actions due within it are done together
 
 
-def _mended(plan: _Plan, piece: _Piece, time: float, rules: Sequence[Maintenance]) -> _Piece:
-    """The stretch after an event."""
+def _after_event(plan: _Plan, piece: _Piece, time: float, rules: Sequence[Maintenance]) -> _Piece:
+    """Period after an event."""
     volume = _volume_at(plan.law, plan.wear_rate, plan.running_in, piece, time)
     new, born = piece.as_new, piece.born
     for rule in rules:
@@ -456,7 +456,7 @@ def _volume_at(
 
 
 def _reached(plan: _Plan, piece: _Piece, volume: float) -> float:
-    """When a volume is reached if nothing is done [s]; at once where it is, never is infinity."""
+    """Time at which a volume is reached without maintenance [s]; infinity if never."""
     work = plan.law.work(volume) - plan.law.work(piece.volume)
     if work <= 0:
         return piece.begin
@@ -469,7 +469,7 @@ def _reached(plan: _Plan, piece: _Piece, volume: float) -> float:
 def _crossings(
     plan: _Plan, pieces: Sequence[_Piece], volume: float, horizon: float
 ) -> Iterator[float]:
-    """Times within the stretches at which a volume is reached from below."""
+    """Times within the periods at which a volume is reached from below."""
     ends = [later.begin for _, later in pairwise(pieces)]
     for piece, end in zip(pieces, [*ends, horizon], strict=True):
         time = _reached(plan, piece, volume)

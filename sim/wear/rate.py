@@ -1,9 +1,9 @@
-"""How fast a joint of a scene wears, and where: sliding work from its own forces and motion.
+"""Wear speed of a joint of a scene, and its distribution: sliding work from forces and motion.
 
-A pump's joint is run for some revolutions and its contact force times its sliding speed summed up.
-A journal bearing rides on its film and does not touch: there it is the turning gear that wears, at
-a few revolutions a minute, on which steam turbines were found to have worn their shells. Below the
-speed of lift-off the film carries a share of the load that grows with the speed, and the
+A pump's joint is run for some revolutions, and its contact force times its sliding speed is summed.
+A journal bearing runs on its film without contact: it wears on the turning gear, at
+a few revolutions a minute, where steam turbines were found to have worn their shells. Below the
+lift-off speed the film carries a share of the load that grows with the speed, and the
 asperities carry the rest.
 """
 
@@ -30,7 +30,7 @@ from ..scene.pump import PumpScene
 from ..scene.scene import SceneError
 from .archard import Float, scar_shape, sliding_work
 
-_SETTLING = 3  # revolutions; contact forgets its start within one
+_SETTLING = 3  # revolutions; contact is independent of its start within one
 _REVOLUTIONS = 10
 
 # --- joints of a pump
@@ -38,23 +38,23 @@ _REVOLUTIONS = 10
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointWear:
-    """What slides in a joint, and where.
+    """Sliding in a joint, and its distribution.
 
     Attributes
     ----------
     power : float
         Mean of contact force times sliding speed [W]; times the specific wear rate [m^2/N] it is
-        the volume worn off in a second [m^3/s].
+        the wear by volume [m^3/s].
     per_revolution : numpy.ndarray [shape=(revolutions,)]
         Sliding work of each revolution [N m].
     eye : numpy.ndarray [shape=(360,)]
-        Share of the wear per radian of the eye, see :func:`.wear.archard.scar_shape`. Angles turn
-        as the stroke's axis turns to the one across it, from the rod's axis where it leaves the
-        rod: half a turn is where thrust presses. Of a guide: shares of upper and lower face
+        Share of the wear per radian of the eye, see :func:`.wear.archard.scar_shape`. Angles are
+        positive from the stroke's axis to the one across it, and start at the rod's axis where it
+        leaves the rod: thrust acts at half a turn. For a guide: shares of upper and lower face
         [shape=(2,)].
     pin : numpy.ndarray [shape=(360,)]
-        The same of the pin: of a crank pin from the direction of the crank, of a wrist pin from
-        that of the stroke. Of a guide the shares again.
+        The same for the pin: for a crank pin from the direction of the crank, for a wrist pin from
+        that of the stroke. For a guide the shares again.
     """
 
     power: float
@@ -73,18 +73,18 @@ def joint_wear(
     Parameters
     ----------
     scene : PumpScene
-        Its duration and settling do not matter.
+        Its duration and settling are ignored.
     joint : {"crankpin", "wristpin", "guide"}
-        An ideal joint carries the forces of its constraint.
+        An ideal joint has the forces of its constraint.
     throw : int
-        Counted from 0.
+        Throw, counted from 0.
     revolutions : int
-        That are summed, >= 1, after three that settle.
+        Number of revolutions summed, >= 1, after three to settle.
 
     Returns
     -------
     JointWear
-        Power, and where it goes.
+        Power, and its distribution.
 
     Raises
     ------
@@ -95,10 +95,10 @@ def joint_wear(
 
     Notes
     -----
-    Forces are means over each step, the motion between its ends is the difference of the states
-    there, so that no part of the work is sampled away; only of a step in which the force reverses
-    is the smaller part lost. Of a guide whose corners press on both faces at once it is the
-    difference that counts.
+    Forces are means over each step, and the motion is the difference of the states at its ends,
+    so that no work is lost by sampling; only in a step with a force reversal
+    the smaller part is lost. For a guide with corners in contact on both faces,
+    the difference counts.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def joint_wear(
 
 
 def _run(scene: PumpScene, revolutions: int) -> tuple[CrankRun, int]:
-    """Run of whole revolutions at constant speed, and the steps of one."""
+    """Run whole revolutions at constant speed; also return the steps per revolution."""
     longest = 1 / (scene.sample_rate * steps_per_sample(scene))
     per_turn = math.ceil(1 / (scene.drive.speed * longest))
     run = run_scene(
@@ -176,7 +176,7 @@ def _guide(scene: PumpScene, run: CrankRun, throw: int) -> _Sliding:  # noqa: AR
 
 
 _JOINTS = {"crankpin": _crankpin, "wristpin": _wristpin, "guide": _guide}
-"""What slides in every joint. A new one is one row."""
+"""Sliding of every joint. A new joint is one row."""
 
 
 def _bodies(run: CrankRun, throw: int) -> Float:
@@ -191,11 +191,11 @@ def _middle(ends: Float) -> Float:
 def _pressed(
     scene: PumpScene, run: CrankRun, throw: int, columns: slice, names: tuple[str, str]
 ) -> tuple[Float, Float, Float]:
-    """Normal force of a pin [N], how fast it moves along the eye [m/s], and where it is [rad]."""
+    """Normal force of a pin [N], its speed along the eye [m/s], and its direction [rad]."""
     offset = pin_offsets(scene, run.turns[:, 0], _bodies(run, throw), throw)[:, columns]
     on_rod = np.column_stack([run.force(name, throw) for name in names])
     place = 0.5 * (offset[1:] + offset[:-1])
-    if _is_ideal(offset):  # the constraint has no place but the direction of its force
+    if _is_ideal(offset):  # a constraint has no contact point; use the direction of its force
         place = on_rod
     length = np.hypot(place[:, 0], place[:, 1])
     normal = place / np.where(length > 0, length, 1.0)[:, None]
@@ -205,7 +205,7 @@ def _pressed(
     return force, slip, np.arctan2(normal[:, 1], normal[:, 0])
 
 
-_CENTRED = 1e-9  # m: Baumgarte's terms hold an ideal joint to less
+_CENTRED = 1e-9  # m: Baumgarte's terms keep an ideal joint closer
 
 
 def _is_ideal(offset: Float) -> bool:
@@ -224,16 +224,16 @@ def _shapes(joint: str, force: Float, weight: Float, eye: Float, pin: Float) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class TurningWear:
-    """What slides in a journal bearing that is turned slowly.
+    """Sliding in a journal bearing that turns slowly.
 
     Attributes
     ----------
     power : float
         Load on the asperities times sliding speed [W].
     lift_off_hz : float
-        Speed at which the film alone carries the load [rev/s].
+        Speed above which the film alone carries the load [rev/s].
     boundary_share : float
-        Of the load, on the asperities.
+        Share of the load on the asperities.
     """
 
     power: float
@@ -247,12 +247,12 @@ def turning_wear(scene: JournalScene, *, speed: float, least_film: float) -> Tur
     Parameters
     ----------
     scene : JournalScene
-        With the scar of the moment; its own speed does not matter.
+        With its present scar; its own speed is ignored.
     speed : float
-        Of the turning gear [rev/s], > 0.
+        Speed of the turning gear [rev/s], > 0.
     least_film : float
         Film at which asperities begin to touch [m], > 0 and below the radial clearance: three
-        times the root mean square of both surfaces' roughness.
+        times the combined rms roughness of both surfaces.
 
     Returns
     -------
@@ -261,17 +261,17 @@ def turning_wear(scene: JournalScene, *, speed: float, least_film: float) -> Tur
     Raises
     ------
     SceneError
-        Speed or film is out of range, all faults at once.
+        Speed or film is out of range; all faults together.
     BearingError
-        No equilibrium was found on the way.
+        No equilibrium was found in the search.
 
     Notes
     -----
     At the gap where asperities begin to touch, the pressure of an isoviscous film is proportional
-    to the speed. Held there by the asperities, whose force hardly moves the journal, the film
-    carries the share ``n / n_lift`` of the load and they carry the rest, ``1 - n / n_lift``: the
-    sharing of Johnson, Greenwood and Poon. Full film wears nothing; neither heat nor grit is
-    modelled, nor are the few turns of each start and stop.
+    to the speed. With the gap held by the asperities, whose force hardly moves the journal, the
+    film carries the share ``n / n_lift`` of the load and they carry the rest, ``1 - n / n_lift``:
+    the load sharing of Johnson, Greenwood and Poon. A full film causes no wear; heat and grit are
+    not modelled, nor are the few turns of each start and stop.
 
     References
     ----------
@@ -308,7 +308,7 @@ def _load(scene: JournalScene) -> tuple[float, float]:
 
 
 def _lift_off(scene: JournalScene, least_film: float) -> float:
-    """Speed at which the least film of the equilibrium is that asked for [rev/s]."""
+    """Speed at which the equilibrium has the given least film [rev/s]."""
     gap, load = scene.bearing.clearance_radial, np.array(_load(scene))
     radius, length = scene.bearing.diameter / 2, scene.bearing.length
     unit = scene.oil.dynamic_viscosity * math.tau * radius**3 * length / gap**2  # at 1 rev/s
@@ -324,13 +324,13 @@ def _lift_off(scene: JournalScene, least_film: float) -> float:
     raise BearingError(found.status, f"lift-off at {speed:g} rev/s")
 
 
-_LIFT_OFF = (1e-3, 1e2)  # rev/s, between which a shaft lifts off
-_LOG_SPEED = 1e-5  # to which its logarithm is sought
+_LIFT_OFF = (1e-3, 1e2)  # rev/s: range of lift-off speeds
+_LOG_SPEED = 1e-5  # tolerance of the logarithm of the speed
 _MESHES = (360, 720, 1440)  # nodes round the circle; the first suffices for a hundredth of the gap
 
 
 def _speed_of(rest: Callable[[float], Equilibrium], least: float) -> float:
-    """Speed of a least film over C: both logarithms, which are nearly proportional."""
+    """Speed for a least film over C, from the logarithms, which are nearly proportional."""
 
     def excess(log_speed: float) -> float:
         return math.log(rest(math.exp(log_speed)).film.min_thickness / least)
