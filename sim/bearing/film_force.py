@@ -24,7 +24,7 @@ from ..film.starved import starved_force
 
 Vector = NDArray[np.float64]
 
-DISPLACEMENT = 1e-5  # of the least gap: rounding 1e-10, truncation less
+DISPLACEMENT = 1e-5  # of the least gap: rounding 1e-10, truncation smaller
 RUNGS = {rung.name: rung for rung in FILM_RUNGS if rung.bearing}
 
 

@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 
 _MOST_HALVINGS = 12
 _LONGEST_STEP = 2.0  # of the logit of the eccentricity: a factor of 7 in the gap
-_LEAST_ROOM = 1e-4  # of the way to contact; no mesh resolves a thinner film
+_LEAST_ROOM = 1e-4  # of the distance to contact: no mesh resolves a thinner film
 _REACH_STEP = 1e-6  # rad
 _LEAST_LOGIT = -math.log(_LEAST_ROOM)
 _OPPOSED = 0.8  # cosine: within 37 degrees of the load
