@@ -104,7 +104,7 @@ def test_models_and_errors(card, manifest):
     rungs = {row["column"]: row["model (records)"] for row in rows(card, "Models and their errors")}
     assert rungs["rung_film"] == f"{manifest['rung_film'][0]} (24)"
     texts = " ".join(b for b in section(card, "Models and their errors") if isinstance(b, str))
-    assert f"largest {100 * manifest['estimated_error'].max():.2g} %, known of 24 records" in texts
+    assert f"largest {100 * manifest['estimated_error'].max():.2g} %, known for 24 records" in texts
     assert "Status of the records: 24 ok." in texts
 
 
@@ -164,12 +164,12 @@ def measured(folder, status=("ok", "no_tacho_pulses"), grade=(-1, -1)):
 
 def test_known_limits_are_those_of_the_file(card, tmp_path):
     [simulated] = section(card, "Known limits")
-    assert simulated[0].startswith("Simulated: it holds what the models hold.")
+    assert simulated[0].startswith("Simulated: it contains only what the models contain.")
     assert any("random by record puts the same machine on both sides" in t for t in simulated)
     with DataSet(measured(tmp_path)) as data:
         page = data_card(data, pictures=False)
     [limits] = section(page, "Known limits")
-    assert limits[0].startswith("Measured: labels are as they were given on import")
+    assert limits[0].startswith("Measured: labels are as given on import")
     assert "The grade of 2 record(s) is not known." in limits
     assert "1 record(s) have a status other than ok: leave them out." in limits
     assert "1 record(s) hold saturated samples, as a real sensor would." in limits

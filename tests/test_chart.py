@@ -994,7 +994,7 @@ def test_an_interrupted_chart_goes_on_to_the_same_page(
     monkeypatch.setattr(Pilot, "_run", stopped)
     done = run_chart(subject, sizes, "-o", str(page))
     assert done.exit_code == 1
-    assert "the same command goes on from there" in done.stderr
+    assert "the same command continues from there" in done.stderr
     assert "Your scene as written is" in done.stdout
     assert page.with_suffix(".part.json").exists()
     again = run_chart(subject, sizes, "-o", str(page))

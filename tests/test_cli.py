@@ -220,8 +220,8 @@ def test_record_number_out_of_range(small_set, small_model):
 def test_a_folder_that_is_a_file_is_one_message(tmp_path, small_set):
     (tmp_path / "file").write_text("")
     for output in ("file/t.csv", "file/deeper/t.csv"):
-        refused("features", small_set, "-o", tmp_path / output, says=["is no folder; create it"])
-    refused("demo", "--folder", tmp_path / "file" / "demo", says=["cannot be made a folder"])
+        refused("features", small_set, "-o", tmp_path / output, says=["is not a folder; create it"])
+    refused("demo", "--folder", tmp_path / "file" / "demo", says=["cannot be made"])
     refused("info", tmp_path / "file" / "x.h5", says=["no such file"])
 
 
@@ -424,7 +424,7 @@ def test_demo_makes_its_files_and_replaces_only_them(tmp_path):
 
 def test_demo_leaves_the_files_of_others_alone(tmp_path):
     (tmp_path / "data.h5").write_text("mine")
-    refused("demo", "--folder", tmp_path, says=["is no earlier demo's", "another folder"])
+    refused("demo", "--folder", tmp_path, says=["is not an earlier demo's", "another folder"])
     assert [path.name for path in tmp_path.iterdir()] == ["data.h5"]
     assert (tmp_path / "data.h5").read_text() == "mine"
     refused("demo", "--folder", "", says=["is empty"])
@@ -484,5 +484,5 @@ def test_seed_reaches_whatever_draws(function, arguments, small_set, tmp_path, m
 
 
 def test_a_seed_without_a_draw_is_refused():
-    refused("chart", "bilge-pump", "--seed", 7, says=["--seed is of the models"])
+    refused("chart", "bilge-pump", "--seed", 7, says=["--seed is for the models"])
     refused("align", "propulsion-shaft", "--seed", 7, says=["--seed need --test"])

@@ -112,9 +112,9 @@ def test_the_usual_row_says_nothing(table_of):
         (("--bearing", "8,3,2"), "roller_diameter = 3.0 must be > 0 and < pitch_diameter = 2.0"),
         (("--band", "500,100"), "band = [500.0, 100.0] Hz must be two rising numbers"),
         (("--speed-hz", "-1"), "must be > 0 and finite"),
-        (("--bearing", "eight"), "must be numbers parted by commas"),
+        (("--bearing", "eight"), "must be numbers separated by commas"),
         (("--only", "rms", "--set", "core"), "give either --set or --only"),
-        (("--list",), "--list stands alone"),
+        (("--list",), "--list takes no other option"),
         (("--set", "all"), "is not one of"),
     ],
 )

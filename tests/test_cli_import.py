@@ -101,7 +101,7 @@ def test_twins_and_records_without_pulses_are_said(wavs, tmp_path):
     twin.write_bytes(wavs[0].read_bytes())
     options = ("--channels", "x,y,key", "--unit", "g", "--tacho", "key", "--segment", 1)
     text = run("import", *wavs, twin, "-o", tmp_path / "x.h5", *options).stdout
-    assert "one.wav and twin.wav hold a same record" in text
+    assert "one.wav and twin.wav hold the same record" in text
     assert "2 with status no_tacho_pulses, which features leaves out" in text
 
 
@@ -174,9 +174,9 @@ def test_errors_name_the_options(wavs, tmp_path):
         ((*wavs, *unit, *three, "--group-by", "column"), ["--group-by = 'column' needs the label"]),
         ((*wavs, *unit, "--unit", "V"), ["cannot all be for every channel"]),
         ((*wavs, "--unit", "=g"), ["must read [CHANNEL=]VALUE"]),
-        ((*wavs, "--unit", "x=g", "--unit", "x=V"), ["once for a channel"]),
+        ((*wavs, "--unit", "x=g", "--unit", "x=V"), ["once per channel"]),
         ((*wavs, *unit, "--label", "load_n"), ["must read NAME=VALUE"]),
-        ((*wavs, *unit, "--label", "a=1", "--label", "a=2"), ["once for a name"]),
+        ((*wavs, *unit, "--label", "a=1", "--label", "a=2"), ["once per name"]),
         ((*wavs, *unit, "--segment", "soon"), ["has no leading number", "or write whole"]),
         ((*wavs, "--fs", "nan"), ["--fs = nan Hz must be >= 0.001"]),
         ((*wavs, "--decimal", ","), ["does not fit WAV files"]),

@@ -90,8 +90,8 @@ def test_a_measured_file_declares_what_it_needs(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--kind", "frf"], "no --plot to write it to"),
-        (["--draw", "probe_1"], "no --plot to write it to"),
+        (["--kind", "frf"], "plot options need --plot"),
+        (["--draw", "probe_1"], "plot options need --plot"),
         (["--kind", "frf", "--plot", "p.png"], "data.h5[0]: frf needs a force channel"),
         (["--draw", "probe_3", "--plot", "p.png"], "no channel 'probe_3'; did you mean 'probe_"),
         (["--force-channel", "cell", "--plot", "p.png"], "no channel 'cell'"),

@@ -92,4 +92,4 @@ def test_what_takes_text_alone_names_it(folder, words):
         said("import", "good.wav", "--unit", "m/s^2", "-o", "d.h5", "-j", 1)
     text = said(*words, code=2)
     assert r"a\udcff" in text
-    assert "is no UTF-8 text" in text
+    assert "is not UTF-8 text" in text

@@ -338,7 +338,7 @@ def test_the_report_names_one_or_many_and_refuses_what_is_of_wear(trained, tmp_p
     assert said.startswith("folder: no condition is named, 1 recordings: 1 unusable\n")
     assert "cut.h5: unusable: file cannot be read" in said
     said = run("report", path, *common, "--fail-on", "alarm", "--trend", code=2).stderr
-    assert "names conditions and knows no wear: leave --fail-on, --trend out" in said
+    assert "is a model of named conditions, without wear: leave out --fail-on, --trend" in said
 
 
 def test_labels_that_cannot_be_learnt_are_refused(trained, tmp_path):

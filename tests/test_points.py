@@ -93,7 +93,7 @@ def test_a_point_tells_its_figures_and_its_settings(chart):
     [mark] = drawn[BEST]
     assert (mark.x, mark.y) == (0.01, pytest.approx(1.5))
     assert (mark.low, mark.high) == (pytest.approx(1.35), pytest.approx(1.65))
-    assert mark.told.splitlines() == [
+    assert mark.hover.splitlines() == [
         "coarse",
         "wall time of a simulated second: 0.01 s/s",
         "error: 1.5 ± 0.1 % (force_peak)",
@@ -120,7 +120,7 @@ def test_the_page_stands_alone_with_a_picture_for_paper(bokeh, chart):
 
 def test_what_has_no_room_is_left_out_or_refused(bokeh):
     def axes(title, n):
-        marks = tuple(Mark(x=i, y=i, told="x" * 500, block="y" * 500) for i in range(n))
+        marks = tuple(Mark(x=i, y=i, hover="x" * 500, block="y" * 500) for i in range(n))
         series = Series(name="", marks=marks, colour="#111111")
         return PointAxes(title=title, x_name="", y_name="", series=(series,))
 
@@ -131,7 +131,7 @@ def test_what_has_no_room_is_left_out_or_refused(bokeh):
 
 
 def test_moments_stand_upright_and_are_named(bokeh):
-    mark = Mark(x=1.0, y=1.0, told="", block="")
+    mark = Mark(x=1.0, y=1.0, hover="", block="")
     series = Series(name="", marks=(mark,), colour="#111111")
     axes = PointAxes(
         title="life",
@@ -184,7 +184,7 @@ def test_a_swept_point_gives_its_settings(bokeh, tmp_path):
 _PLACE = """() => {
   const figure = [...Bokeh.documents[0]._all_models.values()].find(each => each.type === "Figure")
   const view = Bokeh.index.find_one(figure)
-  const found = figure.renderers.filter(each => each.data_source.data.told)
+  const found = figure.renderers.filter(each => each.data_source.data.hover)
   const data = found[0].data_source.data
   view.el.scrollIntoView()
   const box = view.canvas_view.el.getBoundingClientRect()

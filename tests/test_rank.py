@@ -189,7 +189,7 @@ def test_text_table_and_json_tell_the_same(few_set, untimed, tmp_path):
     table = tmp_path / "rank.csv"
     told = strict(run("features", few_set, "--rank", "-j", 1, "--json").stdout)
     text = run("features", few_set, "--rank", "-o", table, "-j", 1).stdout
-    assert f"{told['features'][0]['name']} says most about" in text
+    assert f"{told['features'][0]['name']} is most informative about" in text
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [row["name"] for row in rows] == [each["name"] for each in told["features"]]
 

@@ -267,7 +267,7 @@ def test_machines_of_another_recipe_are_named():
 def test_an_estimate_tells_what_is_not_in_it():
     table = preview(load_recipe("journal-bearing-small"), 6).table
     given, chosen = (preview_text({**table, "fidelity": word}) for word in ("given", "auto"))
-    assert "by tabulated cost; not in it: compiling" in given
+    assert "by tabulated cost, without compiling" in given
     assert "pilots" not in given
     assert "pilots that choose the rungs" in chosen
 

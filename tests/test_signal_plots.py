@@ -448,16 +448,16 @@ def test_names_of_probes_are_whole_on_the_narrow_picture_of_a_page(pairs):
     [
         ("spectrum", {"acc": 60}, "needs >= 64 samples, has 60"),
         ("waterfall", {"acc": 1000}, "needs >= 1024 samples"),
-        ("waterfall", {"force": 4096}, "needs a channel that is no force"),
+        ("waterfall", {"force": 4096}, "needs a channel other than a force"),
         ("orders", {"acc": 4096}, "needs a tacho"),
         ("angle", {"acc": 4096}, "needs a tacho"),
-        ("angle", {"probe": 4096, "tacho": 4096}, "no proximity probe"),
-        ("envelope", {"probe": 4096}, "no proximity probe"),
+        ("angle", {"probe": 4096, "tacho": 4096}, "other than a proximity probe"),
+        ("envelope", {"probe": 4096}, "other than a proximity probe"),
         ("frf", {"acc": 4096}, "needs a force channel, has 0 in N"),
         ("frf", {"force": 4096}, "needs a response"),
         ("frf", {"force": 60, "acc": 60}, "needs >= 64 samples, has 60; record longer"),
         ("orbit", {"acc": 4096, "probe": 4096}, "needs 2 displacement channels, has 1"),
-        ("waveform", {"tacho": 4096}, "needs a channel beside the tacho"),
+        ("waveform", {"tacho": 4096}, "needs a channel besides the tacho"),
     ],
 )
 def test_a_kind_that_is_not_supported_says_what_is_missing(kind, rows, says):

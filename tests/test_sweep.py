@@ -217,7 +217,7 @@ def test_the_command_goes_on_after_an_interrupt(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep_module, "measure", stopped)
     done = command(page)
     assert done.exit_code == 1
-    assert "the same command goes on" in done.stderr
+    assert "the same command continues" in done.stderr
     assert "so far 5 of 8 runs" in page.read_text()
     monkeypatch.undo()
     done = command(page)

@@ -262,7 +262,7 @@ def test_without_bokeh_it_is_refused_with_the_cure(stored, tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--interactive",), "no --plot to write it to"),
+        (("--interactive",), "plot options need --plot"),
         (("--interactive", "--plot", "x.png"), "must be one of .html, .htm"),
         (("--plot", "x.html"), "must be one of .png, .svg, .pdf"),
         (("--interactive", "--kind", "waterfall", "--plot", "x.html"), "cannot be interactive"),

@@ -120,7 +120,7 @@ class Audit:
 
 
 @dataclass
-class _Looked:
+class _LoadedFile:
     """All data read from one file."""
 
     path: Path
@@ -182,20 +182,20 @@ def audit(
     ]
     _refuse_twice([Path(path) for path, _ in given])
     with ExitStack() as stack:
-        looked = [
-            _looked(Path(path), side, roles, stack, jobs=jobs, progress=progress)
+        loaded = [
+            _loaded(Path(path), side, roles, stack, jobs=jobs, progress=progress)
             for path, side in given
         ]
-        for item in looked:
+        for item in loaded:
             item.findings += table_findings(item.table)
-        records = _record_findings(looked)
-        between = [*_between_tables(looked), *_between_draws(looked)]
-    found = [*(f for item in looked for f in item.findings), *records, *between]
+        records = _record_findings(loaded)
+        between = [*_between_tables(loaded), *_between_draws(loaded)]
+    found = [*(f for item in loaded for f in item.findings), *records, *between]
     return Audit(
-        sources=tuple(_source(item) for item in looked),
+        sources=tuple(_source(item) for item in loaded),
         findings=tuple(sorted(found, key=lambda finding: _ORDER[finding.severity])),
-        checked=tuple(_checked(looked)),
-        unchecked=tuple(text for item in looked for text in _unchecked(item, len(looked))),
+        checked=tuple(_checked(loaded)),
+        unchecked=tuple(text for item in loaded for text in _unchecked(item, len(loaded))),
     )
 
 
@@ -234,7 +234,7 @@ def _refuse_twice(paths: Sequence[Path]) -> None:
         raise DataError(f"{', '.join(twice)} is given twice, must be once; name another file")
 
 
-def _looked(
+def _loaded(
     path: Path,
     side: str,
     roles: Roles,
@@ -242,19 +242,19 @@ def _looked(
     *,
     jobs: int,
     progress: Callable[[int, int], None] | None,
-) -> _Looked:
+) -> _LoadedFile:
     if not is_data_set(path):
-        return _Looked(path=path, side=side, table=read_table(path, roles))
+        return _LoadedFile(path=path, side=side, table=read_table(path, roles))
     data = stack.enter_context(DataSet(path))
     if not (data.manifest["status"] == "ok").any():
         raise DataError(f"{path}: 0 usable records, must be > 0; see its column 'status'")
     manifest_table(data, roles, (), np.empty((0, 0)))  # refuse wrong roles before reading all
     kept = sketch(data, jobs=jobs, progress=progress)
     table = manifest_table(data, roles, kept.names, kept.measures)
-    return _Looked(path=path, side=side, table=table, data=data, kept=kept)
+    return _LoadedFile(path=path, side=side, table=table, data=data, kept=kept)
 
 
-def _source(item: _Looked) -> AuditSource:
+def _source(item: _LoadedFile) -> AuditSource:
     table = item.table
     counts = () if table.label is None else np.bincount(table.label, minlength=len(table.classes))
     return AuditSource(
@@ -270,15 +270,15 @@ def _source(item: _Looked) -> AuditSource:
     )
 
 
-def _checked(looked: Sequence[_Looked]) -> Iterator[str]:
+def _checked(loaded: Sequence[_LoadedFile]) -> Iterator[str]:
     yield from CHECKS
-    if any(item.data is not None for item in looked):
+    if any(item.data is not None for item in loaded):
         yield "copied signals, overlapping windows"
-    if len(looked) > 1:
+    if len(loaded) > 1:
         yield "machines and copies in two files"
 
 
-def _unchecked(item: _Looked, files: int) -> Iterator[str]:
+def _unchecked(item: _LoadedFile, files: int) -> Iterator[str]:
     table, name = item.table, item.path.name
     if table.label is None:
         yield f"{name}: nothing about a label, none is known; give label"
@@ -303,9 +303,9 @@ def _unchecked(item: _Looked, files: int) -> Iterator[str]:
 # --- signals
 
 
-def _record_findings(looked: Sequence[_Looked]) -> Iterator[Finding]:
+def _record_findings(loaded: Sequence[_LoadedFile]) -> Iterator[Finding]:
     """Copies and overlaps of signals, within each data set and between two."""
-    sets = [item for item in looked if item.data is not None and item.kept is not None]
+    sets = [item for item in loaded if item.data is not None and item.kept is not None]
     kept = [item.kept for item in sets if item.kept is not None]
     found = copies([item.data for item in sets if item.data is not None], kept) if sets else []
     for number, item in enumerate(sets):
@@ -320,7 +320,7 @@ def _record_findings(looked: Sequence[_Looked]) -> Iterator[Finding]:
             yield _between(sets[i], sets[j], "copied-signals", len(across), _listed(across))
 
 
-def _within(item: _Looked, found: Sequence[Copy], rows: Any, whole: bool) -> Finding:
+def _within(item: _LoadedFile, found: Sequence[Copy], rows: Any, whole: bool) -> Finding:
     """Copies in one data set: an alarm if they lie on both sides of a split or in two machines."""
     across = crossing(item.table.sides, rows)
     groups = item.table.groups
@@ -361,7 +361,7 @@ def _listed(found: Sequence[Copy]) -> list[list[int]]:
 # --- two files
 
 
-def _between(one: _Looked, two: _Looked, code: str, count: int, shown: Any) -> Finding:
+def _between(one: _LoadedFile, two: _LoadedFile, code: str, count: int, shown: Any) -> Finding:
     """Identical rows, signals or machines in two files: an alarm if one trains and one tests."""
     sides = {one.side, two.side} == {"train", "test"}
     what = {"copied-signals": "record", "copied-rows": "row", "shared-machines": "machine"}[code]
@@ -378,9 +378,9 @@ def _between(one: _Looked, two: _Looked, code: str, count: int, shown: Any) -> F
     )
 
 
-def _between_tables(looked: Sequence[_Looked]) -> Iterator[Finding]:
+def _between_tables(loaded: Sequence[_LoadedFile]) -> Iterator[Finding]:
     """Rows and machines that two tables share."""
-    tables = [item for item in looked if item.data is None]
+    tables = [item for item in loaded if item.data is None]
     for i, j, pairs in cross_copies([item.table for item in tables]):
         shown = (pairs[:SHOWN] + 1).tolist()
         yield _between(tables[i], tables[j], "copied-rows", len(pairs), shown)
@@ -394,9 +394,9 @@ def _between_tables(looked: Sequence[_Looked]) -> Iterator[Finding]:
             yield _between(one, two, "shared-machines", both.size, both[:SHOWN].tolist())
 
 
-def _between_draws(looked: Sequence[_Looked]) -> Iterator[Finding]:
+def _between_draws(loaded: Sequence[_LoadedFile]) -> Iterator[Finding]:
     """Machines drawn alike in two simulated sets: from one recipe, or from another's machines."""
-    sets = [(item, item.data) for item in looked if item.data is not None]
+    sets = [(item, item.data) for item in loaded if item.data is not None]
     for (one, first), (two, second) in combinations(sets, 2):
         origin, other = (
             machine_origin(data.attributes.recipe, data.attributes.seed) for data in (first, second)

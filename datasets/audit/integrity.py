@@ -125,12 +125,12 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
         return Checked(path=place, n_records=0, n_failed=0, n_bytes=0, findings=found)
     with data:
         signals = _read_signals(data, progress)
-        seen = _Seen(data, signals)
-        findings = [finding for check in _CHECKS for finding in check(seen)]
+        item = _Inspection(data, signals)
+        findings = [finding for check in _CHECKS for finding in check(item)]
     return Checked(
         path=place,
         n_records=len(data),
-        n_failed=int(np.count_nonzero(~seen.ok)),
+        n_failed=int(np.count_nonzero(~item.ok)),
         n_bytes=signals.n_bytes,
         findings=tuple(sorted(findings, key=lambda finding: finding.severity)),
     )
@@ -188,9 +188,9 @@ def _speeds(rows: NDArray[np.void]) -> NDArray[np.float64]:
     found = np.full(len(rows), math.nan)
     for name in _SPEEDS:  # the last one present wins
         if name in (rows.dtype.names or ()):
-            told = np.asarray(rows[name], dtype=float)
-            known = np.isfinite(told) & (told > 0)
-            found[known] = told[known]
+            values = np.asarray(rows[name], dtype=float)
+            known = np.isfinite(values) & (values > 0)
+            found[known] = values[known]
     return found
 
 
@@ -205,7 +205,7 @@ def _signal_flags(signal: NDArray[np.float32], checksum: int) -> tuple[bool, boo
     )
 
 
-class _Seen:
+class _Inspection:
     """A file with the properties of its signals and its recipe."""
 
     def __init__(self, data: DataSet, signals: _Signals) -> None:
@@ -250,17 +250,17 @@ def _note(check: str, text: str, flags: Any) -> Iterator[IntegrityFinding]:
 # --- checks -------------------------------------------------------------------------------------
 
 
-def _check_hashes(seen: _Seen) -> Iterator[IntegrityFinding]:
-    if seen.data.unhashed:
+def _check_hashes(item: _Inspection) -> Iterator[IntegrityFinding]:
+    if item.data.unhashed:
         text = (
-            f"the file has no {' and no '.join(seen.data.unhashed)}, so that altered labels are "
+            f"the file has no {' and no '.join(item.data.unhashed)}, so that altered labels are "
             "not found; it was made before hashes were added: export it to .h5 to add them"
         )
         yield IntegrityFinding(severity="note", check="hash", text=text)
 
 
-def _check_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
-    signals = seen.signals
+def _check_signals(item: _Inspection) -> Iterator[IntegrityFinding]:
+    signals = item.signals
     yield from _fault(
         "checksum",
         "signal does not fit its checksum; take an intact copy",
@@ -270,29 +270,29 @@ def _check_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
     yield from _fault(
         "signal", "has samples that are not finite; generate it again", signals.infinite & intact
     )
-    silent = signals.zero & intact & seen.ok
+    silent = signals.zero & intact & item.ok
     yield from _fault(
         "signal", "is zero throughout while its status is ok; generate it again", silent
     )
     yield from _note(
         "signal",
         "has a channel that never changes; look at the sensor",
-        signals.constant & intact & seen.ok & ~silent,
+        signals.constant & intact & item.ok & ~silent,
     )
 
 
-def _check_equal_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_equal_signals(item: _Inspection) -> Iterator[IntegrityFinding]:
     """Records that are identical in every byte, whatever their labels."""
-    usable = seen.ok & ~seen.signals.damaged & ~seen.signals.zero
+    usable = item.ok & ~item.signals.damaged & ~item.signals.zero
     first: dict[int, list[int]] = {}
     equal = np.zeros(len(usable), dtype=bool)
     apart = False
-    groups = seen.rows["group"]
-    checksums = seen.rows["signal_crc32"].tolist()
+    groups = item.rows["group"]
+    checksums = item.rows["signal_crc32"].tolist()
     for index in np.flatnonzero(usable).tolist():
         others = first.setdefault(checksums[index], [])
         # of 100,000 records two have the same checksum by chance: compare them
-        twin = next((other for other in others if _same_signal(seen.data, other, index)), None)
+        twin = next((other for other in others if _same_signal(item.data, other, index)), None)
         if twin is None:
             others.append(index)
         else:
@@ -306,12 +306,12 @@ def _same_signal(data: DataSet, one: int, other: int) -> bool:
     return np.array_equal(data.stored_signal(one), data.stored_signal(other))
 
 
-def _check_identities(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_identities(item: _Inspection) -> Iterator[IntegrityFinding]:
     for name in ("record_id", "seed"):
-        if name == "seed" and not seen.simulated:
+        if name == "seed" and not item.simulated:
             continue  # a measured record has none
         values, inverse, counts = np.unique(
-            seen.rows[name], return_inverse=True, return_counts=True
+            item.rows[name], return_inverse=True, return_counts=True
         )
         del values
         yield from _fault(
@@ -321,60 +321,60 @@ def _check_identities(seen: _Seen) -> Iterator[IntegrityFinding]:
         )
 
 
-def _check_status(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_status(item: _Inspection) -> Iterator[IntegrityFinding]:
     failed = Counter(
-        status.decode(errors="replace") for status in seen.rows["status"][~seen.ok].tolist()
+        status.decode(errors="replace") for status in item.rows["status"][~item.ok].tolist()
     )
     if failed:
         kinds = ", ".join(f"{count} {status}" for status, count in failed.most_common())
-        severity: Literal["fault", "note"] = "note" if seen.ok.any() else "fault"
+        severity: Literal["fault", "note"] = "note" if item.ok.any() else "fault"
         text = f"not to be used, by their status: {kinds}"
-        yield IntegrityFinding(severity=severity, check="status", text=text, records=_at(~seen.ok))
+        yield IntegrityFinding(severity=severity, check="status", text=text, records=_at(~item.ok))
 
 
-def _check_numbers(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_numbers(item: _Inspection) -> Iterator[IntegrityFinding]:
     """Numbers must be finite, known if required, and of the right sign."""
-    for name in seen.columns:
-        if seen.rows.dtype[name].kind != "f":
+    for name in item.columns:
+        if item.rows.dtype[name].kind != "f":
             continue
-        values = seen.numbers(name)
+        values = item.numbers(name)
         yield from _fault(
             "number", f"{name} is infinite; generate or import it again", np.isinf(values)
         )
-        if name in _must_be_known(seen):
+        if name in _must_be_known(item):
             text = f"{name} is not a number, must be known; generate it again"
-            yield from _fault("number", text, np.isnan(values) & seen.ok)
-    for name in [name for name in seen.head.severities if name in seen.columns]:
-        yield from _fault("number", f"{name} must be >= 0; correct the label", seen.rows[name] < 0)
-    for name in [name for name in _SPEEDS if name in seen.columns]:
-        wrong = seen.ok & (seen.rows[name] <= 0)
+            yield from _fault("number", text, np.isnan(values) & item.ok)
+    for name in [name for name in item.head.severities if name in item.columns]:
+        yield from _fault("number", f"{name} must be >= 0; correct the label", item.rows[name] < 0)
+    for name in [name for name in _SPEEDS if name in item.columns]:
+        wrong = item.ok & (item.rows[name] <= 0)
         yield from _fault("number", f"{name} must be > 0; correct the label", wrong)
 
 
 _SPEEDS = ("speed_hz", "mean_speed_hz")
 
 
-def _must_be_known(seen: _Seen) -> frozenset[str]:
+def _must_be_known(item: _Inspection) -> frozenset[str]:
     """Columns without gaps in a simulated record; in a measured one anything may be unknown."""
-    if not seen.simulated:
+    if not item.simulated:
         return frozenset()
-    drawn = frozenset(seen.recipe.columns) if isinstance(seen.recipe, Recipe) else frozenset()
-    return (drawn | frozenset(seen.head.severities)) - _MAY_END
+    drawn = frozenset(item.recipe.columns) if isinstance(item.recipe, Recipe) else frozenset()
+    return (drawn | frozenset(item.head.severities)) - _MAY_END
 
 
 _MAY_END = frozenset({"remaining_life_h"})  # unknown if maintenance prevents the end of life
 
 
-def _check_grades(seen: _Seen) -> Iterator[IntegrityFinding]:
-    grades = np.asarray(seen.rows["grade"], dtype=int)
+def _check_grades(item: _Inspection) -> Iterator[IntegrityFinding]:
+    grades = np.asarray(item.rows["grade"], dtype=int)
     yield from _fault(
         "grade", "grade must be -1 to 3; correct the label", (grades < -1) | (grades > 3)
     )
-    edges = seen.head.grade_edges
-    if not edges or not seen.head.severities:
+    edges = item.head.grade_edges
+    if not edges or not item.head.severities:
         return
-    name = seen.head.severities[0]
-    values = seen.numbers(name)
+    name = item.head.severities[0]
+    values = item.numbers(name)
     known = np.isfinite(values) & (values >= 0)
     wanted = np.array([grade(v, edges) if k else -1 for v, k in zip(values, known, strict=True)])
     shown = ", ".join(f"{edge:g}" for edge in edges)
@@ -382,22 +382,22 @@ def _check_grades(seen: _Seen) -> Iterator[IntegrityFinding]:
     yield from _fault("grade", text, known & (grades != wanted))
 
 
-def _check_recipe(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_recipe(item: _Inspection) -> Iterator[IntegrityFinding]:
     """Every drawn value must be within the range of its recipe."""
-    recipe = seen.recipe
+    recipe = item.recipe
     if isinstance(recipe, str):
         if recipe:
             text = f"ranges and groups are not checked against the recipe in the file: {recipe}"
             yield IntegrityFinding(severity="note", check="range", text=text)
         return
     for column, bands in _bands(recipe).items():
-        if column in seen.columns:
-            values = seen.numbers(column)
+        if column in item.columns:
+            values = item.numbers(column)
             outside = np.isfinite(values) & ~_within(values, bands)
             text = f"{column} must be within {_bands_text(bands)} of the recipe; generate it again"
             yield from _fault("range", text, outside)
-    yield from _check_confounders(seen, recipe)
-    yield from _check_groups(seen, recipe)
+    yield from _check_confounders(item, recipe)
+    yield from _check_groups(item, recipe)
 
 
 Bands = Sequence[tuple[float, float]]
@@ -425,14 +425,14 @@ def _bands_text(bands: Bands) -> str:
     return " or ".join(f"{low:.6g} to {high:.6g}" for low, high in bands)
 
 
-def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
+def _check_confounders(item: _Inspection, recipe: Recipe) -> Iterator[IntegrityFinding]:
     """The value of a fault must be in its range if present, and 0 if absent."""
     for fault in recipe.faults:
         presence, value = fault.columns
-        if not {presence, value} <= set(seen.columns):
+        if not {presence, value} <= set(item.columns):
             continue
-        present = np.asarray(seen.rows[presence], dtype=bool)
-        values = seen.numbers(value)
+        present = np.asarray(item.rows[presence], dtype=bool)
+        values = item.numbers(value)
         bands = [band for axis in fault.axes for band in axis.bands]
         wrong = np.where(present, ~_within(values, bands), values != 0)
         text = (
@@ -441,14 +441,14 @@ def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding
         yield from _fault("range", text, wrong)
 
 
-def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
+def _check_groups(item: _Inspection, recipe: Recipe) -> Iterator[IntegrityFinding]:
     """Values drawn per machine must be the same in all records of a machine."""
     most = recipe.table.records_per_group
-    groups, inverse, counts = np.unique(seen.rows["group"], return_inverse=True, return_counts=True)
+    groups, inverse, counts = np.unique(item.rows["group"], return_inverse=True, return_counts=True)
     text = f"group has more than the {most} record(s) of the recipe; generate it again"
     yield from _fault("group", text, counts[inverse] > most)
-    for name in _machine_columns(recipe) & set(seen.columns):
-        values = seen.numbers(name)
+    for name in _machine_columns(recipe) & set(item.columns):
+        values = item.numbers(name)
         first = np.full(len(groups), math.nan)
         first[inverse[::-1]] = values[::-1]  # the first record of each group is written last
         text = f"{name} is drawn per machine, must be one in a group; generate it again"
@@ -456,10 +456,10 @@ def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
         yield from _fault("group", text, np.isin(inverse, inverse[differs]))
 
 
-def _check_lives(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_lives(item: _Inspection) -> Iterator[IntegrityFinding]:
     """Records of a machine must be in order of age."""
-    if _HOURS in seen.columns:
-        hours, groups = seen.numbers(_HOURS), seen.rows["group"]
+    if _HOURS in item.columns:
+        hours, groups = item.numbers(_HOURS), item.rows["group"]
         back = (groups[1:] == groups[:-1]) & (hours[1:] < hours[:-1])
         text = f"{_HOURS} must not fall from record to record of a group; generate it again"
         yield from _fault("group", text, np.append(False, back))
@@ -475,27 +475,27 @@ def _machine_columns(recipe: Recipe) -> set[str]:
     return conditions | {column for fault in per_machine for column in fault.columns}
 
 
-def _check_splits(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_splits(item: _Inspection) -> Iterator[IntegrityFinding]:
     """Every split must have a side for every record, and separate machines if it claims to."""
     try:
-        for name, about in seen.data.splits.items():
-            train, test = seen.data.split(name)
+        for name, about in item.data.splits.items():
+            train, test = item.data.split(name)
             if about.get("machines_apart"):
-                check_no_leak(seen.rows["group"], train, test)
+                check_no_leak(item.rows["group"], train, test)
     except DataError as error:
-        text = str(error).removeprefix(f"{seen.data.path}: ")
+        text = str(error).removeprefix(f"{item.data.path}: ")
         yield IntegrityFinding(severity="fault", check="split", text=text)
 
 
-def _check_clipped(seen: _Seen) -> Iterator[IntegrityFinding]:
-    if "clipped_samples" in seen.columns:
+def _check_clipped(item: _Inspection) -> Iterator[IntegrityFinding]:
+    if "clipped_samples" in item.columns:
         text = "holds samples at the end of the converter's range, as a real sensor would"
-        yield from _note("clipped", text, seen.rows["clipped_samples"] > 0)
+        yield from _note("clipped", text, item.rows["clipped_samples"] > 0)
 
 
-def _check_plausible(seen: _Seen) -> Iterator[IntegrityFinding]:
+def _check_plausible(item: _Inspection) -> Iterator[IntegrityFinding]:
     """Records that are complete but implausible; a constant one has its own note."""
-    for check, found in seen.signals.doubts.items():
+    for check, found in item.signals.doubts.items():
         if check != "still":
             records, texts = zip(*found, strict=True)
             where = f"{check}, such as record {records[0]}" if len(found) > 1 else check
@@ -503,7 +503,7 @@ def _check_plausible(seen: _Seen) -> Iterator[IntegrityFinding]:
             yield IntegrityFinding(severity="note", check="plausible", text=text, records=records)
 
 
-_CHECKS: tuple[Callable[[_Seen], Iterator[IntegrityFinding]], ...] = (
+_CHECKS: tuple[Callable[[_Inspection], Iterator[IntegrityFinding]], ...] = (
     _check_hashes,
     _check_signals,
     _check_equal_signals,

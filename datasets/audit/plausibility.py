@@ -126,5 +126,5 @@ def recording_doubts(
     found = doubts_of(recording.signal, recording, scene, math.nan if speed is None else speed)
     if scene is None or not scene_too:
         return found
-    told = {doubt.check for doubt in found}
-    return (*found, *(doubt for doubt in scene_doubts(scene) if doubt.check not in told))
+    reported = {doubt.check for doubt in found}
+    return (*found, *(doubt for doubt in scene_doubts(scene) if doubt.check not in reported))

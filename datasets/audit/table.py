@@ -295,11 +295,11 @@ def _taken(
     wanted = {role: name for role, name in single.items() if name}
     if roles.label and _is_file(roles.label, frame):
         del wanted["label"]
-    asked = [*wanted.items(), *(("nuisance", name) for name in roles.nuisance)]
+    requested = [*wanted.items(), *(("nuisance", name) for name in roles.nuisance)]
     faults = [
         f"{place}: {role} = {name!r} must be one of its {len(frame.columns)} columns "
         f"({listed(list(map(str, frame.columns)))}); give a name, or a number from 1"
-        for role, name in asked
+        for role, name in requested
         if _column(frame, name) is None
     ]
     taken = {role: str(_column(frame, name)) for role, name in wanted.items()}

@@ -499,9 +499,9 @@ def _write_labels(job: _Job, folder: Path) -> None:
         for name in job.data.rows.dtype.names or ()
         if name not in (*RESERVED, FILE)
     }
-    told = {FILE: [job.file_name(index) for index in job.indices]}
-    told |= {name: column for name, column in cells.items() if any(column)}
-    safe_frame(pd.DataFrame(told)).to_csv(folder / LABELS, index=False)
+    table = {FILE: [job.file_name(index) for index in job.indices]}
+    table |= {name: column for name, column in cells.items() if any(column)}
+    safe_frame(pd.DataFrame(table)).to_csv(folder / LABELS, index=False)
     about = {
         "attributes": json.loads(_attributes_json(job)),
         "import": job.import_command(Path(job.target.name)),  # same bytes anywhere

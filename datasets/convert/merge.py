@@ -201,8 +201,8 @@ def _common(sets: Sequence[DataSet], names: Sequence[str]) -> Attributes:
     for key, words in _SAME:
         values = [kind[key] for kind in kinds]
         # unknown limits do not contradict grades by those of the others
-        told = [value for value in values if key != "limits" or value]
-        if not all(_alike(key, value, told[0]) for value in told):
+        known = [value for value in values if key != "limits" or value]
+        if not all(_alike(key, value, known[0]) for value in known):
             each = "; ".join(f"{v} in {n}" for v, n in zip(values, names, strict=True))
             faults.append(f"{words} must be the same: {each}; make them alike, or merge others")
     if faults:

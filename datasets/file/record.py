@@ -360,8 +360,8 @@ def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
 def _check_layout(file: Any, attributes: Attributes, path: Path) -> None:
     """Refuse a layout that the attributes contradict, before anything large is read."""
     signal, manifest = file["signal"], file["manifest"]
-    beside = [node for group in ("truth", "splits") for node in file.get(group, {}).values()]
-    for dataset in (signal, manifest, *beside):
+    further = [node for group in ("truth", "splits") for node in file.get(group, {}).values()]
+    for dataset in (signal, manifest, *further):
         _check_storage(dataset, path)
     wanted = (len(manifest), len(attributes.channels))
     if signal.shape[:2] != wanted or signal.ndim != 3 or signal.dtype != np.float32:

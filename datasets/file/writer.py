@@ -291,7 +291,7 @@ class DataSetWriter:
             raise LostError(
                 f"{self.part} is gone: it was deleted, moved or replaced during the run, and its "
                 f"{written} records with it; 0 of {len(self.done)} are kept here. Repeat the "
-                "command to start anew"
+                "command to start again"
             )
 
     def manifest(self) -> NDArray[np.void]:

@@ -193,7 +193,7 @@ def generate(
             _writer(
                 plan, count, path, seed=seed, force=force, truth=truth, choice=choice
             ) as writer,
-            _going_on(writer),
+            _with_resume_hint(writer),
         ):
             tally.n_resumed = int(np.count_nonzero(writer.done))
             samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
@@ -207,15 +207,15 @@ def generate(
                 say=say,
                 watch=writer.refuse_lost,
             )
-            with closing(found) as batches, _listening() as asked:
+            with closing(found) as batches, _remembered_interrupt() as interrupted:
                 for outcome in chain.from_iterable(batches):
                     if scheduler is not None and outcome.refused is not None:
-                        _refuse_refusal(outcome, work)
+                        _repeat_here(outcome, work)
                     writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
                     tally.note(outcome)
                     if progress is not None:
                         progress(int(np.count_nonzero(writer.done)), count)
-                    if asked.is_set():
+                    if interrupted.is_set():
                         raise KeyboardInterrupt
             rows = writer.manifest()
             _write_splits(writer, rows, plan, seed)
@@ -224,38 +224,38 @@ def generate(
 
 
 @contextmanager
-def _listening() -> Iterator[threading.Event]:
+def _remembered_interrupt() -> Iterator[threading.Event]:
     """Remember a Ctrl-C: one that arrives in a callback of HDF5 or a finaliser would be lost.
 
     It is not reported as lost either: the run stops at the next record.
     """
-    asked = threading.Event()
+    interrupted = threading.Event()
 
-    def hear(number: int, frame: FrameType | None) -> None:
-        asked.set()
+    def on_interrupt(number: int, frame: FrameType | None) -> None:
+        interrupted.set()
         signal.default_int_handler(number, frame)
 
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield asked
+        yield interrupted
         return
     usual = sys.unraisablehook
 
     def report(lost: "sys.UnraisableHookArgs") -> None:
-        if not (asked.is_set() and lost.exc_type is KeyboardInterrupt):
+        if not (interrupted.is_set() and lost.exc_type is KeyboardInterrupt):
             usual(lost)
 
-    signal.signal(signal.SIGINT, hear)
+    signal.signal(signal.SIGINT, on_interrupt)
     sys.unraisablehook = report
     try:
-        yield asked
+        yield interrupted
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.unraisablehook = usual
 
 
 @contextmanager
-def _going_on(writer: DataSetWriter) -> Iterator[None]:
+def _with_resume_hint(writer: DataSetWriter) -> Iterator[None]:
     """Add to any error that stops a run what is kept, and how to resume."""
     try:
         yield
@@ -284,7 +284,7 @@ def _kept(writer: DataSetWriter) -> str:
     )
 
 
-def _refuse_refusal(outcome: RecordOutcome, work: Callable[[RecordJob], RecordOutcome]) -> None:
+def _repeat_here(outcome: RecordOutcome, work: Callable[[RecordJob], RecordOutcome]) -> None:
     """Repeat a refused record here: a remote worker may only lack a file that the scene names."""
     if outcome.refused is not None and work(outcome.refused).refused is None:
         raise WorkersError(

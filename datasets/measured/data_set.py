@@ -209,8 +209,8 @@ def _placed(
     names = [channel.name for channel in channels]
     faults = [
         f"{what}: no channel {name!r} is imported{nearest(name, names)}"
-        for what, told in (("place", places), ("direction", directions))
-        for name in told
+        for what, given in (("place", places), ("direction", directions))
+        for name in given
         if name not in names
     ]
     if faults:
@@ -366,8 +366,8 @@ def _write(
     progress: Callable[[int, int], None] | None,
 ) -> None:
     for index, (header, record) in enumerate(records):
-        told = table.rows[header.name, int(record.row[ROW])]
-        row = {**told, **record.row, "record_id": str(index)}
+        labels = table.rows[header.name, int(record.row[ROW])]
+        row = {**labels, **record.row, "record_id": str(index)}
         if ROW not in table.columns:
             del row[ROW]
         writer.write(index, record.signal, row)

@@ -121,8 +121,8 @@ def _parser(name: str, unit: str, column: Sequence[str], comma: bool) -> Callabl
     if name.startswith(CONFOUNDER):
         return _flag
     ending = _ending(name)
-    told = [cell for cell in column if cell]
-    if ending is None and not (told and all(_NUMBER.fullmatch(_dot(c, comma)) for c in told)):
+    filled = [cell for cell in column if cell]
+    if ending is None and not (filled and all(_NUMBER.fullmatch(_dot(c, comma)) for c in filled)):
         return _text
     return partial(_number, ending=ending, unit=unit, comma=comma)
 
@@ -142,7 +142,7 @@ def _number(cell: str, *, ending: str | None, unit: str, comma: bool) -> float:
     else:
         raise ValueError(f"must be a number, the heading says {unit}; leave the unit out")
     if not math.isfinite(value):
-        raise ValueError("must be finite; leave the cell empty where it is not known")
+        raise ValueError("must be finite; leave the cell empty if it is unknown")
     return value
 
 
@@ -169,7 +169,7 @@ def _text(cell: str) -> str:
     if size > _LONGEST_TEXT:
         raise ValueError(f"has {size} byte, must have <= {_LONGEST_TEXT}; shorten it")
     if any("\ud800" <= letter <= "\udfff" for letter in cell):
-        raise ValueError("is no UTF-8 text, must be; rewrite it")
+        raise ValueError("is not UTF-8 text, must be; rewrite it")
     match = _WITH_UNIT.fullmatch(cell)
     ends = [end for end, d in ENDINGS.items() if match and match.group(1) in UNITS[d]]
     if ends:

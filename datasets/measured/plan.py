@@ -358,7 +358,7 @@ def _channel_faults(headers: Sequence[Header]) -> list[str]:
     }
     return [
         f"all files must have the same channels: {_kinds(words)}; choose those that all have "
-        "with channels, as new=old to rename; where the files name none, name them all there"
+        "with channels, as new=old to rename; if the files have no names, name all there"
     ]
 
 

@@ -194,8 +194,10 @@ def _conditions(
     for header, own in zip(headers, given, strict=True):
         for name, value in header.conditions.items():
             label = own.get(name, math.nan)
-            told = not (isinstance(label, float) and math.isnan(label))
-            if told and not (isinstance(label, float) and math.isclose(label, value, rel_tol=1e-6)):
+            known = not (isinstance(label, float) and math.isnan(label))
+            if known and not (
+                isinstance(label, float) and math.isclose(label, value, rel_tol=1e-6)
+            ):
                 faults.append(
                     f"{header.name}: label {name} = {label} must be {value:.10g}, as the file "
                     "declares; correct the label, or leave it out"

@@ -144,14 +144,14 @@ def _loose_texts(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
     DataError
         If that happens.
     """
-    asked = [
+    wanted = [
         (name, key)
         for name, item in arrays
         for key in item.attrs
         if (key in UNIT_NAMES or is_rate_name(key)) and is_loose_text(item.attrs.get_id(key))
     ]
     try:
-        texts = texts_by_subprocess(path, asked)
+        texts = texts_by_subprocess(path, wanted)
     except ValueError as error:
         raise DataError(f"{path}: {error}; take an intact copy") from error
     return {place: text.strip() for place, text in texts.items()}
@@ -219,10 +219,10 @@ def _rate_of(item: Any, texts: Mapping[str, str]) -> RateNote:
     for key in filter(is_rate_name, item.attrs):
         value = plain_value(item, key)
         number = float(value) if isinstance(value, (int, float, np.number)) else None
-        told = rate_note(key, texts.get(key) or _text(item, key) or number)
-        if told.declared is not None:
-            return told
-        found = told if found.seen is None else found
+        note = rate_note(key, texts.get(key) or _text(item, key) or number)
+        if note.declared is not None:
+            return note
+        found = note if found.seen is None else found
     return found
 
 
@@ -261,8 +261,8 @@ class _Mat73:
         self.count += 1
         if depth > _DEEPEST or self.count > MOST_LEAVES:
             raise DataError(
-                f"{self.path} holds > {MOST_LEAVES} arrays or structs > {_DEEPEST} deep, the most "
-                "too many; split it"
+                f"{self.path} holds > {MOST_LEAVES} arrays or structs > {_DEEPEST} deep, too "
+                "many; split it"
             )
         if isinstance(item, h5py.Group):
             return self._struct(item, depth)

@@ -176,10 +176,10 @@ def _by_struct(named: Mapping[str, Leaf]) -> dict[str, dict[str, Leaf]]:
 def _with_sibling_fields(part: FilePart, structs: Mapping[str, Mapping[str, Leaf]]) -> FilePart:
     """An array with the unit of its struct, if it is the only array there, and the nearest rate."""
     struct = part.name.rpartition(".")[0]
-    beside = structs[struct]
-    arrays = [leaf for leaf in beside.values() if leaf.kind == "numeric" and leaf.size > 1]
+    fields = structs[struct]
+    arrays = [leaf for leaf in fields.values() if leaf.kind == "numeric" and leaf.size > 1]
     if struct and len(arrays) == 1:
-        texts = [beside[key].text for key in UNIT_NAMES if key in beside]
+        texts = [fields[key].text for key in UNIT_NAMES if key in fields]
         unit = next(filter(None, texts), None)
         part = replace(part, channels=tuple(replace(c, unit=unit) for c in part.channels))
     rate = _nearest_rate(struct, structs)
@@ -190,9 +190,9 @@ def _nearest_rate(struct: str, structs: Mapping[str, Mapping[str, Leaf]]) -> Rat
     """Rate of the struct, or else of the one that contains it, and so on."""
     while True:
         for key, leaf in structs.get(struct, {}).items():
-            told = rate_note(key, leaf.text or leaf.scalar()) if is_rate_name(key) else RateNote()
-            if told.declared is not None or told.seen is not None:
-                return told
+            note = rate_note(key, leaf.text or leaf.scalar()) if is_rate_name(key) else RateNote()
+            if note.declared is not None or note.seen is not None:
+                return note
         if not struct:
             return RateNote()
         struct = struct.rpartition(".")[0]
@@ -206,9 +206,9 @@ def _member(name: str, leaf: Leaf, index: int, key: str) -> str:
 
 def _part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> FilePart | str:
     """A part; or a description of what it is instead, empty for single numbers and texts."""
-    asked = name in options.variables
+    requested = name in options.variables
     if leaf.kind != "numeric" or leaf.size <= 1:
-        if asked:
+        if requested:
             raise DataError(
                 f"{path}: {name} is {leaf.kind} {leaf.shape}, must be real numbers (samples, "
                 "channels); choose another variable"
@@ -217,7 +217,7 @@ def _part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> FilePart
     try:
         return array_part(path, name, leaf, options)
     except DataError:
-        if asked:
+        if requested:
             raise
         return f"{name} {leaf.shape}"
 

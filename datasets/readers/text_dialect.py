@@ -251,9 +251,9 @@ def _refuse_numbered(
     steps = np.diff([_plain(row[0], dialect.decimal) for row in cells[:4]])
     if steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3):
         return  # times that continue from the first line
-    told = dialect.delimiter.join(cells[0])[:40]
+    shown = dialect.delimiter.join(cells[0])[:40]
     raise DataError(
-        f"{path}: line 1, {told!r}, may name the columns by number or be a sample; give header, "
+        f"{path}: line 1, {shown!r}, may name the columns by number or be a sample; give header, "
         "the lines before the numbers: 1 or 0"
     )
 

@@ -94,8 +94,8 @@ def index_lines(
 def _refuse_long(path: Path, number: int, lengths: NDArray[np.int64], longest: int) -> None:
     if lengths.max(initial=0) > longest:
         raise DataError(
-            f"{path}: a line behind line {number} has more than {longest} byte, the longest "
-            "believed; is it text with line feeds, or are its rows records (rows)?"
+            f"{path}: a line after line {number} has more than {longest} byte, too long; is it "
+            "text with line feeds, or are its rows records (rows)?"
         )
 
 

@@ -87,9 +87,9 @@ def machine_faults(table: RecipeTable, folder: Path) -> list[str]:
     except SceneError as error:
         return [f"machines_of: {fault}" for fault in error.faults]
     if other.machines_of or other.name != table.machines_of:
-        told = other.machines_of or other.name
+        made = other.machines_of or other.name
         return [
-            f"machines_of = '{table.machines_of}' must be the recipe that draws them; name '{told}'"
+            f"machines_of = '{table.machines_of}' must be the recipe that draws them; name '{made}'"
         ]
     return [
         f"machines_of = '{other.name}': {name} must be as it is there; extend that recipe and "

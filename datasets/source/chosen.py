@@ -27,8 +27,8 @@ def part_of_record(file: Path, part: FilePart, options: SourceOptions, record: i
 def chosen_part(file: Path, contents: Contents, options: SourceOptions, record: int) -> FilePart:
     """The part chosen by the options, or a DataError that lists the content."""
     names = [part.name for part in contents.parts]
-    asked = options.variables or _named_by_channels(names, options)
-    wanted = [_fitting(file, pattern, names) for pattern in asked]
+    requested = options.variables or _named_by_channels(names, options)
+    wanted = [_fitting(file, pattern, names) for pattern in requested]
     if wanted:
         missing = [name for name in wanted if name not in names]
         if missing:
@@ -38,7 +38,7 @@ def chosen_part(file: Path, contents: Contents, options: SourceOptions, record: 
             )
         found = [contents.parts[names.index(name)] for name in wanted]
         found = [part_of_record(file, part, options, record) for part in found]
-        pairs = zip(found, asked, strict=True)
+        pairs = zip(found, requested, strict=True)
         return _merged(file, [_by_pattern(part, pattern) for part, pattern in pairs])
     known = [part for part in contents.parts if part.known_as]
     if len(known) == 1:

@@ -213,9 +213,9 @@ def _meaning(
         missing.append(f"channel '{name}': {error.args[0]}")
         return blank, 1.0
     except ValueError as error:
-        told = (options.per_channel(what, name) for what in _MEANINGS)
+        stated = (options.per_channel(what, name) for what in _MEANINGS)
         # a wrong declaration in the file can still be listed, and be replaced by the caller
-        quiet = all(text is None for text in told)
+        quiet = all(text is None for text in stated)
         (missing if quiet else faults).append(f"channel '{name}': {error}")
         return blank, 1.0
     channel = SourceChannel(

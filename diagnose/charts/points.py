@@ -95,7 +95,7 @@ def _mark(chart: Chart, point: Point) -> Mark:
         y=value,
         low=max(value - error, floor) if known else math.nan,
         high=value + error if known else math.nan,
-        told="\n".join(lines),
+        hover="\n".join(lines),
         block=f"{point.block or f'# {point.name}'}\n{plain}",
     )
 

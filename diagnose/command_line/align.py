@@ -27,7 +27,7 @@ from ..options.shared import (
 )
 
 _ALIGN_FAIL_ON_HELP = (
-    "Exit 3 where a limit is not met, 4 where a bearing lifts or no moves help; alarm: only 4."
+    "Exit 3 if a limit is not met, 4 if a bearing lifts or no moves help; alarm: only 4."
 )
 
 
@@ -69,7 +69,7 @@ _ALIGN_FAIL_ON_HELP = (
     show_default=True,
     help="Safety margin to each limit, as a fraction of it.",
 )
-@click.option("--jack", metavar="BEARING", help="Simulate a jacking test beside this bearing.")
+@click.option("--jack", metavar="BEARING", help="Simulate a jacking test next to this bearing.")
 @click.option(
     "--test",
     "rig_test",
@@ -146,10 +146,10 @@ def align(
         raise click.UsageError("--push, --test-plot and --seed need --test")
     if not calibrate and (margin or target != "limits" or prefer != "least"):
         raise click.UsageError(
-            "--margin, --target and --prefer are of the moves: leave out --no-calibrate"
+            "--margin, --target and --prefer concern the moves: leave out --no-calibrate"
         )
     if rig_test is not None and not calibrate:
-        raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
+        raise click.UsageError("--test compares before and after moves: leave out --no-calibrate")
     outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
     inputs = [*tests, *(path for path in (reactions, jacking) if path)]
     check_outputs([scene_name, *inputs], outputs, force)
@@ -185,7 +185,7 @@ def align(
 def _measured(
     scene: Any, tests: Sequence[Path], reactions: Path | None, jacking: Path | None, condition: str
 ) -> tuple[Any, Any]:
-    """The scene where its tests put it, and what they say; as it is where there are none."""
+    """The scene as placed by its tests, with their results; unchanged without tests."""
     if not tests and reactions is None and jacking is None:
         return scene, None
     from ..shaft_tests.sag_report import sag_report, sagged
@@ -203,7 +203,7 @@ def _tested(
     seed: int,
     force: bool,
 ) -> tuple[Any, dict[str, Any] | None, list[str]]:
-    """Result, table and text of the simulated test of the moves, if one was asked for."""
+    """Result, table and text of the simulated test of the moves, if requested."""
     if kind is None:
         return None, None, []
     from ..pages.picture import save_picture

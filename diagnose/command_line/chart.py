@@ -28,10 +28,10 @@ from ..options.shared import (
     json_option,
     overrides_of,
     points_option,
+    report_bare_units,
     scene_of,
     seed_option,
     set_option,
-    tell_bare,
     worker_count,
 )
 
@@ -160,7 +160,7 @@ def chart(
     rungs stay, and the cheapest rungs if they may change. Cheap information comes first; when the
     budget ends, or at Ctrl-C, the answer so far is given, and with -o the same command continues
     from there. DATA (.h5): features and models, cost against error. RECIPE with --accuracy
-    verdict=2%: which rungs may be cheaper if models trained on them must keep the verdict.
+    verdict=2%: the cheaper rungs with which trained models still keep the verdict.
     """
     check_interactive(interactive, output)
     of_data = subject.endswith(DATA_SUFFIXES)
@@ -192,7 +192,7 @@ def chart(
     if of_data and (pairs or accuracy is not None or applied):
         raise click.UsageError("--set, --accuracy and --apply are for a scene, not for a data set")
     if seed and not of_data:
-        raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
+        raise click.UsageError("--seed is for the models on a data set; a scene's chart draws none")
     if of_data:
         found = _data_chart(subject, budget, output, seed, jobs, force, interactive)
         _emit_chart(found, [output], as_json)
@@ -204,7 +204,7 @@ def chart(
     from .chart_run import scene_chart_command
 
     values = overrides_of(pairs)
-    tell_bare(subject, values)
+    report_bare_units(subject, values)
     found, interrupted = scene_chart_command(
         subject,
         values,
@@ -219,14 +219,14 @@ def chart(
     )
     _emit_chart(found, [output, applied], as_json)
     if interrupted:
-        going_on = "; the same command goes on from there" if output else ""
-        click.echo(f"interrupted: what was measured is shown{going_on}", err=True)
+        resumed = "; the same command continues from there" if output else ""
+        click.echo(f"interrupted: the measurements so far are shown{resumed}", err=True)
         raise click.exceptions.Exit(EXIT_FAILED)
 
 
-_CHART_BUDGET = 90.0  # s of a scene
+_CHART_BUDGET = 90.0  # s, for a scene
 
-_VERDICT_RECORDS = 120  # on every choice of rungs of a recipe
+_VERDICT_RECORDS = 120  # for each choice of rungs of a recipe
 
 
 def _data_chart(

@@ -47,7 +47,7 @@ def scene_chart_command(
     force: bool,
     interactive: bool,
 ) -> tuple[Chart, bool]:
-    """Measure a scene, write what is asked for.
+    """Measure a scene and write the requested files.
 
     Parameters
     ----------
@@ -56,24 +56,24 @@ def scene_chart_command(
     given : mapping of str to object
         Values that replace its own.
     accuracy : float or None
-        The scene's own where None.
+        Accuracy [-]; None for that of the scene.
     budget : float
-        [s]
+        Time limit [s].
     output, applied : Path or None
-        Chart; scene with what is recommended.
+        Chart; scene with the recommendation.
     choice : str
         ``kept`` or ``raised``: which recommendation is applied.
     jobs : int
     force : bool
-        Replace existing files, and begin anew.
+        Replace existing files, and start from the beginning.
     interactive : bool
-        Of a page: points to tap.
+        For a page: points that can be tapped.
 
     Returns
     -------
     chart : Chart
     interrupted : bool
-        By the user: what had been measured is in it.
+        Whether the user interrupted the run; the chart holds the measurements so far.
     """
     part = part_file(output)
     going_on = part is not None and part.exists() and not force
@@ -121,7 +121,7 @@ def verdict_chart_command(
     force: bool,
     interactive: bool,
 ) -> Chart:
-    """Measure what the rungs of a recipe are worth to the verdict, write what is asked for.
+    """Measure the value of a recipe's rungs for the verdict and write the requested files.
 
     Parameters
     ----------
@@ -132,18 +132,18 @@ def verdict_chart_command(
     accuracy : float
         Rise of the error over the condemning limit.
     records : int
-        On every choice of rungs.
+        Records for each choice of rungs.
     effects : sequence of str
-        Only these.
+        Effects to compare.
     folder : Path or None
-        Keeps the data sets; they vanish without.
+        Folder that keeps the data sets; without it they are deleted.
     output, applied : Path or None
-        Chart; recipe with what is recommended.
+        Chart; recipe with the recommendation.
     seed, jobs : int
     force : bool
         Replace existing files.
     interactive : bool
-        Of a page: points to tap.
+        For a page: points that can be tapped.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def verdict_chart_command(
 
 
 def _seen_from(applied: Path, recipe: str) -> str:
-    """A recipe as another file names it."""
+    """Name of a recipe as written in another file."""
     return recipe if recipe in recipe_names() else os.path.relpath(recipe, applied.parent)
 
 
@@ -205,14 +205,14 @@ def _apply(
 
 @contextmanager
 def _watched(search: Search, scene: Scene, jobs: int, budget: float) -> Iterator[None]:
-    """What is known, on stderr as soon as it is; a bar with the time left on a terminal."""
+    """Show the answer so far on stderr, and on a terminal a bar with the time left."""
     with time_bar() as show:
-        search.report = _Teller(search, scene, jobs, budget, show)
+        search.report = _Progress(search, scene, jobs, budget, show)
         yield
 
 
-class _Teller:
-    """Called with what is measured next: says what is known by then."""
+class _Progress:
+    """Called before each measurement; reports what is known by then."""
 
     def __init__(
         self,
@@ -229,11 +229,11 @@ class _Teller:
 
     def __call__(self, what: str) -> None:
         gone = time.perf_counter() - self.begin
-        told, known = self.search.progress()
+        done, total = self.search.progress()
         self._answer(gone)
         if self.show is not None:
             left = min(max(self.budget - gone, 0.0), self.search.remaining() / self.jobs)
-            self.show(f"{what} ({told} of {known})", gone, left)
+            self.show(f"{what} ({done} of {total})", gone, left)
 
     def _answer(self, gone: float) -> None:
         """The scene against its own numerics, then against the best rungs; each once."""

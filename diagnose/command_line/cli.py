@@ -1,10 +1,10 @@
 """The command line. Commands call library functions and hold no physics.
 
-Results go to stdout, progress and talk to stderr. With ``--json`` the result is one JSON object on
-stdout; an error is one on stderr, its last line, with ``error.message``, ``error.faults`` and
-``exit_code``, and stdout stays empty. Exit codes: 0 done, 1 failed, 2 bad input (also
-where no recording can be judged); with ``report --fail-on``: 3 warning, 4 alarm, 5 unfamiliar.
-Heavy imports stay inside the commands, so that ``--help`` answers at once.
+Results go to stdout, progress and messages to stderr. With ``--json`` the result is one JSON object
+on stdout; an error is one on stderr, its last line, with ``error.message``, ``error.faults`` and
+``exit_code``, and stdout stays empty. Exit codes: 0 done, 1 failed, 2 bad input (also if no
+recording can be judged); with ``report --fail-on``: 3 warning, 4 alarm, 5 unfamiliar. Heavy imports
+stay inside the commands, so that ``--help`` answers at once.
 """
 
 import io
@@ -32,7 +32,7 @@ from .scene import frf, scene, simulate, verify
 from .sweep import sweep
 from .train import calibrate, demo, train
 
-# files are written under another name first, which says nothing to the caller
+# files are first written under another name, which means nothing to the caller
 _UNFINISHED = re.compile(r"\.part\b|\.[0-9a-f]{8}\.tmp\b")
 
 
@@ -43,7 +43,7 @@ class _Group(HelpfulGroup):
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """As of click; keeps whether an error is to be told as JSON."""
+        """As in click; remembers whether an error is to be reported as JSON."""
         ctx.meta[_AS_JSON] = "--json" in args
         return super().parse_args(ctx, args)
 
@@ -59,23 +59,23 @@ class _Group(HelpfulGroup):
             if word is None:
                 raise
             text = _UNFINISHED.sub("", word.group())
-            _end(context, f"{text} is no UTF-8 text; rename or rewrite it", EXIT_BAD_INPUT)
+            _end(context, f"{text} is not UTF-8 text; rename or rewrite it", EXIT_BAD_INPUT)
         except (ValueError, RuntimeError) as error:
             if not type(error).__module__.startswith(__name__.split(".")[0]):
-                raise  # not ours: a defect, with its traceback
+                raise  # a defect of the program, shown with its traceback
             command = self.get_command(context, context.invoked_subcommand or "")
             code = EXIT_BAD_INPUT if isinstance(error, ValueError) else EXIT_FAILED
             text = as_options(str(error), command)
-            # a scene's errors begin with a line that counts them, others are a line each
+            # a scene's errors begin with a line that counts them, others have a line each
             faults = [as_options(fault, command) for fault in getattr(error, "faults", ())]
             _end(context, text, code, faults or text.splitlines())
         except KeyboardInterrupt as error:
             if not str(error):
-                raise  # click says that it ends
+                raise  # click reports the end
             click.echo(f"\n{error}", err=True)  # below the ^C of the terminal
             raise click.exceptions.Exit(EXIT_FAILED) from None
         except BrokenPipeError:
-            raise  # the reader of stdout has gone: click ends quietly
+            raise  # the reader of stdout is gone: click ends quietly
         except OSError as error:
             text = _UNFINISHED.sub("", str(error))
             _end(context, f"{text}; check path, rights and space", EXIT_BAD_INPUT)
@@ -87,7 +87,7 @@ _AS_JSON = f"{__name__}.as_json"
 
 
 def _end(context: click.Context, text: str, code: int, faults: Sequence[str] = ()) -> NoReturn:
-    """Tell an error, as words or as JSON, and end with its code."""
+    """Report an error, as text or as JSON, and end with its code."""
     if context.meta[_AS_JSON]:
         error = {"message": text, "faults": list(faults) or [text]}
         click.echo(json_text({"schema_version": 1, "error": error, "exit_code": code}), err=True)
@@ -99,8 +99,8 @@ def _end(context: click.Context, text: str, code: int, faults: Sequence[str] = (
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; ends the process with its exit code.
 
-    What the encoding of stdout or stderr cannot say is written with a backslash: a file name need
-    not be text.
+    Characters that the encoding of stdout or stderr lacks are written with a backslash, since a
+    file name need not be text.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # None under pythonw
@@ -118,8 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def cli(context: click.Context) -> None:
     """Condition monitoring built around physics.
 
-    Simulate a machine that wears, make labelled data sets, train a wear estimate, and report on
-    a recording. Without a command: three ways to begin.
+    Simulate a machine that wears, make labelled data sets, train a wear estimate, and report on a
+    recording. Without a command, three ways to begin are shown.
     """
     if context.invoked_subcommand is None:
         click.echo(FIRST_CONTACT, nl=False)

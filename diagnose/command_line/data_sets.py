@@ -130,7 +130,7 @@ def _generated_text(summary: Any) -> str:
     type=click.Choice(["refuse", "drop"]),
     default="refuse",
     show_default=True,
-    help="What to do with records whose id and signal are already in an earlier data set.",
+    help="Treatment of records whose id and signal are already in an earlier data set.",
 )
 @force_option
 @json_option
@@ -236,7 +236,7 @@ def splits(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Show the splits stored in DATA, or add some; signals and manifest stay as they are.
+    """Show the splits stored in DATA, or add some; signals and manifest are not changed.
 
     With --force, a split of the same name is replaced.
     """
@@ -264,7 +264,7 @@ def splits(
 
 
 def _bounds(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """``column=low:high`` pairs; an end that is left out is infinite."""
+    """``column=low:high`` pairs; a missing end is infinite."""
     found: dict[str, tuple[float, float]] = {}
     for text in texts:
         column, _, ends = text.partition("=")
@@ -272,7 +272,7 @@ def _bounds(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
         good = all(not end or NUMBER.fullmatch(end) for end in (low, high))
         if not (column and sign and good and (low or high)) or column in found:
             raise click.BadParameter(
-                f"'{text}' must read COLUMN=LOW:HIGH, once for a column", param_hint="--bound"
+                f"'{text}' must read COLUMN=LOW:HIGH, once per column", param_hint="--bound"
             )
         found[column] = (float(low or -math.inf), float(high or math.inf))
     return found
@@ -296,7 +296,7 @@ def _bounds(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
     "--nuisance",
     multiple=True,
     metavar="COLUMN",
-    help="Column of a condition that must not follow the label.",
+    help="Column of a condition that must not be related to the label.",
 )
 @click.option(
     "--train", multiple=True, type=PATH, help="File of training rows, compared with --test."
@@ -323,8 +323,8 @@ def audit(
 ) -> None:
     """Find leaks, copies and unfit splits in data sets (.h5) and tables (.csv, .parquet).
 
-    Columns are given by name, or by number from 1. Data sets and tables of `wearstate features`
-    know their label and machines.
+    Columns are given by name, or by number from 1. Label and machines of data sets, and of tables
+    of `wearstate features`, are known.
     """
     from ...datasets.audit.audit import audit as run
     from ...datasets.audit.table import Roles

@@ -1,4 +1,4 @@
-"""Commands that tell how far a model can be trusted: evaluate, blindspots."""
+"""Commands that show how far a model can be trusted: evaluate, blindspots."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -97,7 +97,7 @@ def evaluate(
 
     With --split: on the test side of this split of DATA. With --retrain: train as MODEL was
     trained, with other parts of DATA held out, and judge on these. With --across-fidelity: find
-    what it costs to train on a cheaper model of the machine.
+    the loss of accuracy when training on a cheaper model of the machine.
     """
     from ..class_model.file import CLASS_MODEL
     from ..wear_model.bundle import kind_of
@@ -108,7 +108,7 @@ def evaluate(
         if data is not None:
             raise click.UsageError("--across-fidelity makes its own data: name a recipe only")
         if named or output:
-            raise click.UsageError("--across-fidelity takes no option of a judgement on DATA")
+            raise click.UsageError("--across-fidelity takes no option for judging on DATA")
         _judge_across(model_file, records or _ACROSS, effects, pairs, folder, seed, jobs, as_json)
         return
     if data is None:
@@ -117,15 +117,15 @@ def evaluate(
         raise click.UsageError("-n, --effect, --set and --folder need --across-fidelity")
     if given["retrain"] and (given["trained_on"] or given["split"]):
         raise click.UsageError(
-            "--retrain trains on DATA, by splits of its own: --trained-on and --split have no "
-            "meaning with it"
+            "--retrain trains on DATA with its own splits: --trained-on and --split do not apply; "
+            "leave them out"
         )
     if given["retrain"] and given["joined"]:
-        raise click.UsageError("--retrain knows no joined views: leave --join or --retrain out")
+        raise click.UsageError("--retrain has no joined views: leave out --join or --retrain")
     check_outputs([model_file, data], [(output, _EVALUATION)], force)
     if kind_of(model_file) == CLASS_MODEL:
         if named or output:
-            raise click.UsageError("a model of named conditions takes no such option")
+            raise click.UsageError("this option does not apply to a model of named conditions")
         _judge_classes(model_file, data, seed, worker_count(jobs), as_json)
         return
     _judge(model_file, data, output, seed, worker_count(jobs), force, as_json, given)
@@ -135,7 +135,7 @@ _EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
 
 
 def _judge_classes(model_file: Path, data: Path, seed: int, jobs: int, as_json: bool) -> None:
-    """Of a model of named conditions."""
+    """Judge a model of named conditions."""
     from ..class_model.file import load_class_model
     from ..class_model.text import classes_text
     from ..class_model.train import evaluate_classes
@@ -156,7 +156,7 @@ def _judge(
     as_json: bool,
     given: Mapping[str, Any],
 ) -> None:
-    """Of a finished model, or by splits; text or JSON, and a file if asked for."""
+    """Judge a finished model, or by splits; print text or JSON, and write a file if requested."""
     from ..evaluation.figure import save_evaluation
     from ..evaluation.protocol import evaluate_splits
     from ..evaluation.splits import ALL_SPLITS, case_of
@@ -196,7 +196,7 @@ def _judge_across(
     jobs: int | None,
     as_json: bool,
 ) -> None:
-    """Losses of training on cheaper rungs; the data sets vanish unless a folder is given."""
+    """Losses from training on cheaper rungs; the data sets are deleted unless a folder is given."""
     from tempfile import TemporaryDirectory
 
     from ..charts.across import across_fidelity, across_table, across_text
@@ -260,12 +260,12 @@ def blindspots(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Measure the error of MODEL where one assumption of its recipe does not hold.
+    """Measure the error of MODEL if an assumption of its recipe does not hold.
 
-    The same simulated machines, unseen in training, are judged again and again: each value that the
+    The same simulated machines, unseen in training, are judged repeatedly: each value that the
     recipe holds fixed is shifted, each drawn value is moved beyond its range, and the signal is
     disturbed, one at a time. The table begins with the largest error without a caution. With -o,
-    finished rows are kept beside the page until all are done.
+    finished rows are kept in the folder of the page until all are done.
     """
     from ..blindspots.blindspots import file_hash, find_blind_spots, kept_rows, recipe_of, run_key
     from ..blindspots.signals import signal_rows
@@ -281,7 +281,7 @@ def blindspots(
     inputs = [model_file, *([background] if background else [])]
     check_outputs(inputs, [(output, PAGE_SUFFIXES)], force or going_on)
     if kind_of(model_file) == CLASS_MODEL:
-        raise click.UsageError(f"{model_file} names conditions, no wear; name a wear model")
+        raise click.UsageError(f"{model_file} is a model of named conditions; name a wear model")
     model = load_model(model_file)
     plan = recipe_of(model, recipe)
     if part is not None and force:

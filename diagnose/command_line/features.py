@@ -1,4 +1,4 @@
-"""The command `features`: feature tables, and which features show the wear."""
+"""The command `features`: feature tables, and the features that show the wear."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -50,8 +50,7 @@ _FEATURE_SETS = (
     "--set",
     "feature_set",
     type=click.Choice(_FEATURE_SETS),
-    help="standard: those that models are trained on (default); core: without the most expensive; "
-    "complete: all.",
+    help="standard: the default for training; core: without the most expensive; complete: all.",
 )
 @click.option(
     "--only", multiple=True, metavar="NAMES", help="Only these features, separated by commas."
@@ -112,16 +111,16 @@ def features(
     machine, and what they cost.
     """
     if target and not rank:
-        raise click.UsageError("--target is of --rank")
+        raise click.UsageError("--target needs --rank")
     if listing:
         if data is not None or output is not None or rank:
-            raise click.UsageError("--list stands alone: it reads and writes no file")
+            raise click.UsageError("--list takes no other option: it reads and writes no file")
         _emit_catalogue(feature_set or _FEATURE_SETS[-1], as_json)
         return
     if data is None or (output is None and not rank):
         raise click.UsageError("give DATA and --output, DATA and --rank, or --list")
     if only and feature_set:
-        raise click.UsageError("give either --set or --only: names are looked for in every set")
+        raise click.UsageError("give either --set or --only: names are searched in all sets")
     from ...datasets.file.views import views_of
     from ..feature_rows.feature_table import (
         absent_in,
@@ -140,7 +139,7 @@ def features(
     command = click.get_current_context().command
     absent = {name: as_options(why, command) for name, why in absent_in(data, choice).items()}
     if feature_set and absent:
-        click.echo(f"absent, as --json explains: {', '.join(absent)}", err=True)
+        click.echo(f"absent (reasons: --json): {', '.join(absent)}", err=True)
     elif slow := [name for name, why in absent.items() if why.startswith("fs = ")]:
         click.echo(f"absent: {', '.join(slow)}: {absent[slow[0]]}", err=True)
     with progress_bar("features") as progress:
@@ -155,10 +154,10 @@ def features(
     size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
     text = f"{output}: {size['records']} records, {size['features']} features"
     tests = sources if any("frf" in name for name in table.names) else []
-    told = dict(sum((Counter(excitation_notes(one, choice.settings)) for one in tests), Counter()))
-    for note, count in told.items():
+    notes = dict(sum((Counter(excitation_notes(one, choice.settings)) for one in tests), Counter()))
+    for note, count in notes.items():
         click.echo(f"{count} records: {note}", err=True)
-    emit({**size, "absent": absent, "tests": told}, as_json, text)
+    emit({**size, "absent": absent, "tests": notes}, as_json, text)
 
 
 _RANKED = (*PAGE_SUFFIXES, ".csv")
@@ -173,7 +172,7 @@ def _emit_rank(
     force: bool,
     as_json: bool,
 ) -> None:
-    """What the features of a set tell, printed and, if so wished, written."""
+    """Print the ranking of a set's features and write it if requested."""
     from ..inspect.rank_text import rank_set, rank_table, rank_text, save_rank
 
     found = rank_set(data, table, choice, target=target)
@@ -184,7 +183,7 @@ def _emit_rank(
 
 
 def _emit_catalogue(feature_set: Any, as_json: bool) -> None:
-    """The catalogue, one line a feature."""
+    """Print the catalogue, one line per feature."""
     from ...features.catalogue.row import catalogue
 
     rows = catalogue(feature_set)

@@ -1,4 +1,4 @@
-"""Commands about measured files: import them, show what is in them."""
+"""Commands for measured files: import them, show their content."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ from ..options.source import (
     exponential_option,
     source_options,
     speed_option,
-    told_of_channels,
+    texts_by_channel,
 )
 
 _CARD = (*PAGE_SUFFIXES, ".md")
@@ -54,7 +54,7 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
 @command("import")
 @click.argument("files", metavar="FILES…", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", type=PATH, help="Data set to write (.h5).")
-@click.option("--list", "only_list", is_flag=True, help="Show what is in FILES; write nothing.")
+@click.option("--list", "only_list", is_flag=True, help="Show the content of FILES; write nothing.")
 @source_options
 @click.option("--labels", type=PATH, help="CSV with a column 'file' and one column for each label.")
 @click.option(
@@ -72,8 +72,8 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
 @click.option(
     "--group-by",
     type=click.Choice(["file", "folder", "column"]),
-    help="What identifies a machine; default: column 'group' of the labels if there is one, else "
-    "the file.",
+    help="What identifies a machine; default: column 'group' of the labels if there is one, or "
+    "else the file.",
 )
 @click.option(
     "--segment",
@@ -123,7 +123,7 @@ def import_files(
         emit({"files": found}, as_json, contents_text(found))
         return
     if output is None:
-        raise click.UsageError("-o/--output must name the data set to write; or ask for --list")
+        raise click.UsageError("-o/--output must name the data set to write; or use --list")
     check_outputs(
         [*files, *filter(None, [given["labels"]])], [(output, DATA_SUFFIXES)], given["force"]
     )
@@ -135,8 +135,8 @@ def import_files(
             options=declared_source(given),
             labels=labels,
             limits=read_limits(limits, labels.severities) if limits else None,
-            places=told_of_channels(given["place"], "--place"),
-            directions=told_of_channels(given["direction"], "--direction"),
+            places=texts_by_channel(given["place"], "--place"),
+            directions=texts_by_channel(given["direction"], "--direction"),
             jobs=worker_count(jobs),
             progress=progress,
             **{name: given[name] for name in _IMPORT_OPTIONS},
@@ -153,7 +153,7 @@ _IMPORT_OPTIONS = (
 
 
 def _labels(given: Mapping[str, Any]) -> Any:
-    """Labels of a table and of words."""
+    """Labels from a table and from constants."""
     from ...datasets.measured.labels import read_labels
 
     constants: dict[str, str] = {}
@@ -162,7 +162,7 @@ def _labels(given: Mapping[str, Any]) -> Any:
         name, sign, value = (part.strip() for part in pair.partition("="))
         if not sign or not name or name in constants:
             raise click.BadParameter(
-                f"'{pair}' must read NAME=VALUE, once for a name", param_hint="--label"
+                f"'{pair}' must read NAME=VALUE, once per name", param_hint="--label"
             )
         constants[name] = value
     return read_labels(given["labels"], constants, given["severity"])
@@ -236,7 +236,7 @@ def info(
         _about_set(file, check, card, licence, force, as_json)
         return
     if plot is None and (kind or interactive or any(wanted.values())):
-        raise click.UsageError("what to plot is given, but no --plot to write it to")
+        raise click.UsageError("plot options need --plot, the picture to write")
     if file is None:
         facts = describe_fft()
         emit(facts, as_json, fft_text(facts))
@@ -265,7 +265,7 @@ def info(
 def _about_set(
     file: Path, check: bool, card: Path | None, licence: str, force: bool, as_json: bool
 ) -> None:
-    """Check a data set, write its card, or both; a card of an unsound one is not written."""
+    """Check a data set, write its card, or both; no card is written of an unsound one."""
     from ...datasets.audit.integrity import check_set, checked_table, checked_text
 
     check_outputs([file], [(card, _CARD)], force)

@@ -69,8 +69,8 @@ def recipe_check(file: str, as_json: bool) -> None:
         for doubt in scene_doubts(sample.scene):
             doubts.setdefault(doubt.check, f"record {sample.index}: {doubt.text}")
     warnings = draw_doubts(checked, read_recipe(file).inherited) + list(doubts.values())
-    told = f", {len(warnings)} warning(s)" if warnings else ""
-    lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
+    count = f", {len(warnings)} warning(s)" if warnings else ""
+    lines = [f"{checked.name}: no fault{count}", *(f"warning: {text}" for text in warnings)]
     table = {"recipe": checked.name, "faults": [], "warnings": warnings}
     emit(table, as_json, "\n".join(lines))
 

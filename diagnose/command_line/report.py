@@ -21,8 +21,8 @@ from ..options.shared import (
     join_option,
     json_option,
     overrides_of,
+    report_bare_units,
     seed_option,
-    tell_bare,
 )
 from ..options.source import declared_source, source_options
 from ..pages.plain_json import json_text
@@ -130,8 +130,8 @@ def report(
         wrong = [option for option, value in wear.items() if value]
         if wrong:
             raise click.UsageError(
-                f"{model_file} names conditions and knows no wear: leave {', '.join(wrong)} out, "
-                "or name a wear model"
+                f"{model_file} is a model of named conditions, without wear: leave out "
+                f"{', '.join(wrong)}, or name a wear model"
             )
         _report_class(source, model_file, given, as_json)
         return
@@ -149,16 +149,16 @@ def report(
     usual = model.card.trained_on.scene
     values = overrides_of(pairs)
     if scene is not None:
-        tell_bare(scene, values)
+        report_bare_units(scene, values)
     plate = nameplate_of(source, scene, values, usual=usual)
     ways = (output, machine, as_json, force, given, views)
-    told = _ReportTask(source, model_file, model, baselines, plate, *ways)
-    verdicts = _report_many(told) if many else _report_one(told)
+    task = _ReportTask(source, model_file, model, baselines, plate, *ways)
+    verdicts = _report_many(task) if many else _report_one(task)
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
 
 
 def _check_interactive(output: Path | None, untimed: bool) -> None:
-    """Refuse curves where there is no page, many recordings without trend, or nothing to draw."""
+    """Refuse curves without a page, for many recordings without trend, or without data."""
     from ..pages.embed import require_bokeh
 
     if output is None:
@@ -172,16 +172,16 @@ def _check_interactive(output: Path | None, untimed: bool) -> None:
 
 
 def _holds_many(source: Path) -> bool:
-    """Whether a folder, or a data set of which no record is chosen."""
+    """Whether the source is a folder, or a data set without a chosen record."""
     from ..report.batch import record_count
 
-    asked = click.get_current_context().get_parameter_source("record")
-    chosen = asked is not click.core.ParameterSource.DEFAULT
+    origin = click.get_current_context().get_parameter_source("record")
+    chosen = origin is not click.core.ParameterSource.DEFAULT
     return source.is_dir() or (not chosen and record_count(source) > 1)
 
 
 def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_json: bool) -> None:
-    """The condition in recordings; of JSON each as soon as it is told. Exit 2 where none can be."""
+    """Print the condition of recordings; as JSON each at once. Exit 2 if none can be judged."""
     from ...datasets.measured.recording import read_recording
     from ..class_model.file import load_class_model
     from ..class_model.text import naming_text, namings_summary
@@ -216,7 +216,7 @@ def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_j
 
 
 class _ReportTask(NamedTuple):
-    """What both kinds of report are given."""
+    """Inputs of both kinds of report."""
 
     source: Path
     model_file: Path
@@ -235,102 +235,102 @@ _Verdict = tuple[str, int | None]
 """Verdict and grade."""
 
 
-def _report_one(told: _ReportTask) -> list[_Verdict]:
+def _report_one(task: _ReportTask) -> list[_Verdict]:
     """Report on one recording."""
     from ...datasets.measured.recording import read_recording, with_views
     from ..workflow.report import judged
 
     recording = read_recording(
-        told.source,
-        declared_source(told.given),
-        tacho=told.given["tacho"],
-        pulses_per_revolution=told.given["pulses_per_revolution"],
+        task.source,
+        declared_source(task.given),
+        tacho=task.given["tacho"],
+        pulses_per_revolution=task.given["pulses_per_revolution"],
     )
-    heard = with_views(recording, told.source, told.given["record"], told.views)
+    heard = with_views(recording, task.source, task.given["record"], task.views)
     found = judged(
         heard,
-        told.model,
-        baselines=told.baselines,
-        plate=told.plate,
-        machine=told.machine,
-        twin=_opinion(told, heard),
-        files={"recording": told.source, "model": told.model_file},
+        task.model,
+        baselines=task.baselines,
+        plate=task.plate,
+        machine=task.machine,
+        twin=_opinion(task, heard),
+        files={"recording": task.source, "model": task.model_file},
     )
     table, text = found.table, found.text
-    if told.output is not None:
-        found.save(told.output, force=told.force, interactive=told.given["interactive"])
-        table["html"] = str(told.output)
-        text += f"\nPage        {told.output}"
-    click.echo(json_text(table) if told.as_json else text)
+    if task.output is not None:
+        found.save(task.output, force=task.force, interactive=task.given["interactive"])
+        table["html"] = str(task.output)
+        text += f"\nPage        {task.output}"
+    click.echo(json_text(table) if task.as_json else text)
     return [(table["estimate"]["verdict"], found.estimate.grade)]
 
 
-def _opinion(told: _ReportTask, heard: Any) -> Any:
-    """What the twin says of a recording, if one was named."""
+def _opinion(task: _ReportTask, heard: Any) -> Any:
+    """Estimate of the twin for a recording, if one was named."""
     from ..twin.opinion import second_opinion
 
-    if not told.given["twin"]:
+    if not task.given["twin"]:
         return None
-    wear, seed = told.model.card.severity, told.given["seed"]
+    wear, seed = task.model.card.severity, task.given["seed"]
     with progress_bar("simulating") as progress:
-        return second_opinion(told.given["twin"], heard, wear=wear, seed=seed, progress=progress)
+        return second_opinion(task.given["twin"], heard, wear=wear, seed=seed, progress=progress)
 
 
-def _report_many(told: _ReportTask) -> list[_Verdict]:
-    """Report on a folder or data set; of JSON one line each, as soon as it is judged."""
+def _report_many(task: _ReportTask) -> list[_Verdict]:
+    """Report on a folder or data set; as JSON one line each, as soon as it is judged."""
     from ..pages.page import save_page
     from ..report.batch import HOURS, judge_all, recordings_in
     from ..report.text import batch_text
 
-    given = told.given
+    given = task.given
     dates = given["dates"]
     if given["trend"] and dates is None:
-        dates = "names" if told.source.is_dir() else HOURS
-    healthy = told.baselines and Path(told.baselines.source)
-    others = [path for path in (told.output, told.model_file, Path(dates or ""), healthy) if path]
+        dates = "names" if task.source.is_dir() else HOURS
+    healthy = task.baselines and Path(task.baselines.source)
+    others = [path for path in (task.output, task.model_file, Path(dates or ""), healthy) if path]
     with (
         recordings_in(
-            told.source,
+            task.source,
             declared_source(given),
             tacho=given["tacho"],
             pulses_per_revolution=given["pulses_per_revolution"],
             leave_out=others,
-            views=told.views,
+            views=task.views,
         ) as items,
         progress_bar("judging") as progress,
     ):
         batch = judge_all(
-            told.source,
+            task.source,
             items,
-            told.model,
-            model_file=told.model_file,
-            baselines=told.baselines,
-            plate=told.plate,
+            task.model,
+            model_file=task.model_file,
+            baselines=task.baselines,
+            plate=task.plate,
             dates=dates,
             growth=given["growth"],
             seed=given["seed"],
-            on_result=(lambda line: click.echo(json_text(line))) if told.as_json else None,
+            on_result=(lambda line: click.echo(json_text(line))) if task.as_json else None,
             progress=progress,
         )
-        if told.output is not None:
+        if task.output is not None:
             from ..report.page import batch_html
 
             page = batch_html(
                 batch,
-                told.model,
-                machine=told.machine,
-                baselines=told.baselines,
-                plate=told.plate,
+                task.model,
+                machine=task.machine,
+                baselines=task.baselines,
+                plate=task.plate,
                 interactive=given["interactive"],
             )
-            save_page(page, told.output, force=told.force)
-    if not told.as_json:
-        click.echo(batch_text(batch) + (f"\nPage        {told.output}" if told.output else ""))
+            save_page(page, task.output, force=task.force)
+    if not task.as_json:
+        click.echo(batch_text(batch) + (f"\nPage        {task.output}" if task.output else ""))
     return [(row.verdict, row.grade) for row in batch.current]
 
 
 def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
-    """Nothing judged is bad input, asked or not; else only what --fail-on asks for."""
+    """Exit code: bad input if nothing was judged; otherwise as requested by --fail-on."""
     from ..learning.grades import ALARM_GRADE, WARNING_GRADE
 
     if all(verdict == "unusable" for verdict, _ in verdicts):

@@ -52,7 +52,7 @@ def scene_show(name: str) -> None:
 
     text = scene_text(name)
     if not isinstance(scene_table(text, name).get("machine"), str):
-        raise SceneError(name, ["machine is missing, must be a text; this file is no scene"])
+        raise SceneError(name, ["machine is missing, must be a text; this file is not a scene"])
     click.echo(text, nl=False)
 
 
@@ -69,8 +69,8 @@ def scene_check(file: str, pairs: Sequence[str], deep: bool, as_json: bool) -> N
     """Check a scene: all faults at once, and warnings of likely mistakes.
 
     --deep: a table of the machine's key figures (natural frequencies, forces, films, contacts,
-    cost), each with its usual range, and a correction where it is outside. Exit 2 for faults, with
-    --deep also where a short simulation fails; an unusual figure alone is no fault.
+    cost), each with its usual range, and a correction if it is outside. Exit 2 for faults, with
+    --deep also if a short simulation fails; an unusual figure alone is no fault.
     """
     from ...sim.machine.simulate import check
     from ...sim.scene.plausibility import scene_doubts
@@ -81,8 +81,8 @@ def scene_check(file: str, pairs: Sequence[str], deep: bool, as_json: bool) -> N
         _deep_check(checked, as_json)
         return
     warnings = [doubt.text for doubt in scene_doubts(checked)]
-    told = f", {len(warnings)} warning(s)" if warnings else ""
-    lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
+    count = f", {len(warnings)} warning(s)" if warnings else ""
+    lines = [f"{checked.name}: no fault{count}", *(f"warning: {text}" for text in warnings)]
     emit({"scene": checked.name, "faults": [], "warnings": warnings}, as_json, "\n".join(lines))
 
 
@@ -92,8 +92,8 @@ def _deep_check(checked: Any, as_json: bool) -> None:
 
     found = deep_check(checked)
     faults = [found.failure] if found.failure else []
-    told = {"scene": checked.name, "faults": faults, "warnings": list(found.warnings)}
-    emit({**told, **deep_check_table(found)}, as_json, deep_check_text(checked.name, found))
+    result = {"scene": checked.name, "faults": faults, "warnings": list(found.warnings)}
+    emit({**result, **deep_check_table(found)}, as_json, deep_check_text(checked.name, found))
     raise click.exceptions.Exit(EXIT_BAD_INPUT if faults else 0)
 
 

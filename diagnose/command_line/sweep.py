@@ -1,4 +1,4 @@
-"""The command `sweep`: numbers of a scene varied."""
+"""The command `sweep`: variation of numbers of a scene."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,9 +23,9 @@ from ..options.shared import (
     json_option,
     overrides_of,
     points_option,
+    report_bare_units,
     seed_option,
     set_option,
-    tell_bare,
     worker_count,
 )
 
@@ -68,7 +68,7 @@ _SUFFIXES = (*CHART_SUFFIXES, ".htm")
     type=Share(0.5, 0.9999),
     default=0.95,
     show_default=True,
-    help="Probability of detecting a change, and of reporting none where there is none.",
+    help="Probability of detecting a change, and of reporting none if there is none.",
 )
 @click.option(
     "-o",
@@ -99,8 +99,8 @@ def sweep(
     """Vary numbers of SCENE: find which feature shows a change, from which size, and where first.
 
     The last --over is the change to detect, such as a clearance; those before it are conditions,
-    such as the speed. With -o, runs are kept beside the output until all are done: after Ctrl-C the
-    same command continues. The CSV has one row for each point and start, in SI units.
+    such as the speed. With -o, runs are kept in the folder of the output until all are done: after
+    Ctrl-C the same command continues. The CSV has one row for each point and start, in SI units.
     """
     from ..pages.kept import part_file
     from ..sweep.axes import SweepError
@@ -113,7 +113,7 @@ def sweep(
     going_on = part is not None and part.exists() and not force
     check_outputs([scene_name], [(output, _SUFFIXES)], force or going_on)
     values = overrides_of(pairs)
-    tell_bare(scene_name, values)
+    report_bare_units(scene_name, values)
     plan = sweep_plan(
         scene_name,
         over,
@@ -145,6 +145,6 @@ def sweep(
     text = "\n".join([sweep_text(found), *files])
     emit({**sweep_table(found), "files": files}, as_json, text)
     if interrupted:
-        on = "; the same command goes on from there" if output else ""
-        click.echo(f"interrupted: what was simulated is shown{on}", err=True)
+        resumed = "; the same command continues from there" if output else ""
+        click.echo(f"interrupted: the simulations so far are shown{resumed}", err=True)
         raise click.exceptions.Exit(EXIT_FAILED)

@@ -1,4 +1,4 @@
-"""Commands that make a model: calibrate a scene, train, and the demonstration of it all."""
+"""Commands that make a model: calibrate a scene, train, and a demonstration of the workflow."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -40,7 +40,7 @@ from ..options.shared import (
     "--recipe",
     type=RECIPE,
     default=None,
-    help="Recipe that says what is unknown of such machines, and how widely; default: the "
+    help="Recipe that specifies the unknown values of such machines and their ranges; default: the "
     "standard one.",
 )
 @click.option(
@@ -66,10 +66,10 @@ def calibrate(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Estimate what is unknown of the pump SCENE from healthy RECORDINGS of it.
+    """Estimate the unknown values of the pump SCENE from healthy RECORDINGS of it.
 
-    Writes the calibrated scene, and beside it what is known of its numbers, to generate records
-    from. Recordings that no machine of the scene could have made are refused.
+    Writes the calibrated scene, and the distribution of its numbers next to it, from which records
+    can be generated. Recordings that no machine of the scene could have made are refused.
     """
     from ..twin.calibration import PRIOR
     from ..twin.calibration import calibrate as run
@@ -104,7 +104,7 @@ def calibrate(
     type=Share(0, 0.9),
     default=0.25,
     show_default=True,
-    help="Share of the machine draws kept out of training, to judge the model.",
+    help="Share of the machine draws held out of training, to judge the model.",
 )
 @click.option(
     "--split",
@@ -160,7 +160,7 @@ def train(
     """Train a wear model on a labelled data set and judge it on held-out machine draws.
 
     With --join: on several tests of each machine state together; each feature is named after its
-    view. Where the target names conditions instead of a severity: a model that names the condition,
+    view. If the target names conditions instead of a severity: a model that names the condition,
     judged with each recording left out in turn.
     """
     from ...datasets.file.views import views_of
@@ -179,7 +179,7 @@ def train(
     source = click.get_current_context().get_parameter_source("held_out")
     shared = source is not click.core.ParameterSource.DEFAULT
     if shared and split:
-        raise click.UsageError("--split says what is held out: leave --held-out away")
+        raise click.UsageError("--split determines what is held out: leave out --held-out")
     choices = tuple(replace(choice, views=views) for choice in choices_of(features))
     if target is not None and names_classes(data, target):
         if len(choices) > 1:
@@ -263,7 +263,7 @@ def _train_classes(
     save_class_model(model, output, force=force)
     head = (
         f"{output}: trained on {model.card.records} records of {result['recordings']} "
-        f"recordings, to tell {', '.join(model.classes)}"
+        f"recordings, to distinguish {', '.join(model.classes)}"
     )
     notice = [f"Notice: {model.notice}."] if model.notice else []
     value = {"path": str(output), "target": target, "left_out": result, "notice": model.notice}

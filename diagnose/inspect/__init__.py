@@ -1,4 +1,4 @@
-"""What files, data sets, scenes and recipes hold in words: info, card, audit, keys, ranking.
+"""Text summaries of files, data sets, scenes and recipes: info, card, audit, keys, ranking.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.fidelity``, ``sim.deep_check``,
 ``features.signal``, ``datasets.file``, ``datasets.source``, ``datasets.draws``,

@@ -1,4 +1,4 @@
-"""What an audit found, in words and for programs."""
+"""Result of an audit as text and for programs."""
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ def audit_table(found: Audit) -> dict[str, Any]:
     Parameters
     ----------
     found : Audit
-        Of :func:`~..datasets.audit.audit`.
+        Audit from :func:`~..datasets.audit.audit`.
 
     Returns
     -------
@@ -43,12 +43,12 @@ def audit_table(found: Audit) -> dict[str, Any]:
 
 
 def audit_text(found: Audit) -> str:
-    """An audit as a report to a person: the verdict, the findings, what was not looked at.
+    """An audit as a text report: the verdict, the findings, what was not checked.
 
     Parameters
     ----------
     found : Audit
-        Of :func:`~..datasets.audit.audit`.
+        Audit from :func:`~..datasets.audit.audit`.
 
     Examples
     --------
@@ -68,12 +68,12 @@ def splits_table(data: DataSet) -> dict[str, Any]:
     Parameters
     ----------
     data : DataSet
-        Any.
+        Any data set.
 
     Returns
     -------
     dict
-        ``path``, ``records`` and ``splits``: by name, records of each side and how it was made.
+        ``path``, ``records`` and ``splits``: by name, the records of each side and the description.
     """
     sides = {name: data.split(name) for name in data.splits}
     return {
@@ -92,7 +92,7 @@ def splits_text(value: Mapping[str, Any]) -> str:
     Parameters
     ----------
     value : mapping
-        Of :func:`splits_table`.
+        Table from :func:`splits_table`.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def _finding_lines(number: int, finding: Finding) -> Iterator[str]:
 
 
 def _examples(finding: Finding) -> Iterator[str]:
-    """Values behind a finding, where showing them helps."""
+    """Values behind a finding, if showing them helps."""
     numbers = finding.numbers
     examples: Sequence[Mapping[str, Any]] = numbers.get("examples", ())
     for example in examples[:_SHOWN]:

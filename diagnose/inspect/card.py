@@ -1,4 +1,4 @@
-"""One page about a data set: what it holds, how it was made, its limits, how to load it."""
+"""One page about a data set: its content, origin, limits, and how to load it."""
 
 import json
 from collections import Counter
@@ -27,14 +27,14 @@ from ..pictures.panel import panel_figure
 from ..pictures.view import View
 
 MOST_DRAWN = 3
-"""Channels of a picture."""
+"""Channels drawn in a picture."""
 
 _FEW_TEXTS = 4  # different texts of a column that are listed
 
 
 @dataclass(frozen=True, kw_only=True)
 class CardTable:
-    """Rows under a head; the columns named in `numbers` are set to the right."""
+    """Rows under a header; the columns listed in `numbers` are right-aligned."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -43,7 +43,7 @@ class CardTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Code:
-    """A snippet that runs beside the file."""
+    """A code snippet that runs in the folder of the file."""
 
     title: str
     text: str
@@ -51,7 +51,7 @@ class Code:
 
 @dataclass(frozen=True, kw_only=True)
 class CardPicture:
-    """A drawing of one recording."""
+    """A picture of one recording."""
 
     caption: str
     image: PageImage
@@ -81,23 +81,23 @@ class Card:
 def write_card(
     path: str | Path, card: Path, *, licence: str = "not stated", force: bool = True
 ) -> None:
-    """Write the page about a data set, whole or not at all.
+    """Write the page about a data set, completely or not at all.
 
     Parameters
     ----------
     path : str or Path
         A finished data set file.
     card : Path
-        ``.md``: tables; ``.html``: pictures of each class too, in one file.
+        ``.md``: tables; ``.html``: also pictures of each class, in one file.
     licence : str
-        Of the data, as its owner states it.
+        Licence of the data, as stated by their owner.
     force : bool
         Replace an existing file.
 
     Raises
     ------
     DataError
-        The data set cannot be read, or the suffix is another.
+        If the data set cannot be read, or the suffix is wrong.
     """
     if card.suffix not in (".md", ".html", ".htm"):
         raise DataError(f"{card}: suffix {card.suffix!r} must be .html or .md; rename it")
@@ -108,26 +108,26 @@ def write_card(
 
 
 def data_card(data: DataSet, *, licence: str = "not stated", pictures: bool = True) -> Card:
-    """What a data set is, from the file alone.
+    """Description of a data set, from the file alone.
 
     Parameters
     ----------
     data : DataSet
-        Open.
+        Open data set.
     licence : str
-        Of the data.
+        Licence of the data.
     pictures : bool
-        One recording of every grade, drawn.
+        Whether to draw one recording of every grade.
 
     Returns
     -------
     Card
-        Every number is counted in the file; signals are read only to be drawn.
+        Page; all numbers are counted in the file, and signals are read only to be drawn.
 
     Raises
     ------
     DataError
-        The file is damaged.
+        If the file is damaged.
     """
     facts = _Facts(data)
     sections: dict[str, list[Block]] = {
@@ -149,7 +149,7 @@ def data_card(data: DataSet, *, licence: str = "not stated", pictures: bool = Tr
 
 
 class _Facts:
-    """What several sections need."""
+    """Data used by several sections."""
 
     def __init__(self, data: DataSet) -> None:
         self.data = data
@@ -171,7 +171,7 @@ class _Facts:
 
     @property
     def primary(self) -> str:
-        """Column to learn: the first severity, else the grade."""
+        """Column to predict: the first severity, or else the grade."""
         return self.head.severities[0] if self.head.severities else "grade"
 
     @property
@@ -226,7 +226,7 @@ def _labels(facts: _Facts) -> Iterator[Block]:
     yield _balance(facts)
     faults = confounders_in(facts.manifest)
     if faults:
-        yield "Faults beside the wear, each with a label of its own:"
+        yield "Faults other than wear, each with its own label:"
         rows = [
             (name.replace("_", " "), f"confounder_{name}", *_count(present.sum(), len(present)))
             for name, present in faults.items()
@@ -249,7 +249,7 @@ def _count(count: Any, total: int) -> tuple[str, str]:
 
 
 def _balance(facts: _Facts) -> CardTable:
-    """How many records and machines each grade has."""
+    """Number of records and machines of each grade."""
     grades = facts.manifest["grade"]
     rows = []
     for grade in sorted(grades.unique()):
@@ -263,7 +263,7 @@ def _balance(facts: _Facts) -> CardTable:
 
 
 def _pictures(facts: _Facts) -> Iterator[Block]:
-    """Waveform and spectrum of one usable record of each grade, of middling severity."""
+    """Waveform and spectrum of one usable record of each grade, of medium severity."""
     names = facts.data[0].vibration_names[:MOST_DRAWN]
     for grade in sorted(set(facts.usable["grade"].tolist())):
         records = facts.usable[facts.usable["grade"] == grade]
@@ -281,28 +281,28 @@ def _pictures(facts: _Facts) -> Iterator[Block]:
 
 
 def _columns(facts: _Facts) -> Iterator[Block]:
-    told, empty = [], []
+    rows, empty = [], []
     for column in describe_columns([str(name) for name in facts.manifest]):
         values = facts.manifest[column.name]
         known = _known(values)
         if known.empty:
             empty.append(column.name)
         else:
-            told.append(_column_row(column, known, len(values)))
+            rows.append(_column_row(column, known, len(values)))
     head = ("column", "unit", "meaning", "least", "median", "largest", "unknown")
-    yield CardTable(head=head, rows=tuple(told), numbers=head[3:])
+    yield CardTable(head=head, rows=tuple(rows), numbers=head[3:])
     if empty:
         yield f"Unknown in every record: {', '.join(empty)}."
 
 
 def _known(values: pd.Series) -> pd.Series:
-    """Values that say something: NaN, the empty text and a count of -1 do not."""
-    told = values.notna()
+    """Known values: without NaN, empty texts and counts of -1."""
+    known = values.notna()
     if values.dtype.kind == "i":
-        told &= values >= 0
+        known &= values >= 0
     if values.dtype.kind in "OUT":
-        told &= values != ""
-    return values[told]
+        known &= values != ""
+    return values[known]
 
 
 def _column_row(column: Column, known: pd.Series, total: int) -> tuple[str, ...]:
@@ -341,7 +341,7 @@ def _models(facts: _Facts) -> Iterator[Block]:
 
 def _choice_text(facts: _Facts) -> str:
     if not facts.head.fidelity:
-        return "Models and steps are those that the scene names; none was chosen by its error."
+        return "Models and steps are those named in the scene; none was chosen by its error."
     chosen = FidelityChoice.load(facts.head.fidelity).text
     return f"Chosen on pilots, before the first record: {chosen}."
 
@@ -353,9 +353,9 @@ def _error_text(facts: _Facts) -> str:
     if errors.empty:
         return "The numerical error is not estimated."
     return (
-        f"Estimated numerical error of what features use: median {100 * errors.median():.2g} %, "
-        f"largest {100 * errors.max():.2g} %, known of {len(errors)} records. It says how well the "
-        "equations are solved, not how well they fit a real machine."
+        f"Estimated numerical error of the features: median {100 * errors.median():.2g} %, "
+        f"largest {100 * errors.max():.2g} %, known for {len(errors)} records. It shows how well "
+        "the equations are solved, not how well they fit a real machine."
     )
 
 
@@ -368,23 +368,23 @@ def _splits(facts: _Facts) -> Iterator[Block]:
         text = str(about.get("text", about.get("kind", "")))
         rows.append((name, text, str(len(train)), str(len(test)), str(rest), apart))
     if rows:
-        head = ("split", "how it was made", "train", "test", "neither", "machines apart")
+        head = ("split", "description", "train", "test", "neither", "machines apart")
         yield CardTable(head=head, rows=tuple(rows), numbers=head[2:5])
     else:
-        yield "None is stored in the file. Split by the column group: it keeps a machine together."
+        yield "The file has none. Split by the column group, which keeps machines together."
 
 
 def _limits(facts: _Facts) -> list[str]:
-    """What a user must know before relying on it, each counted in the file."""
+    """Limits that a user must know, each counted in the file."""
     texts = []
     if facts.simulated:
         texts += [
-            "Simulated: it holds what the models hold. That a method works here does not show "
-            "that it works on a real machine.",
-            "Grades are as frequent as the recipe draws them, not as they are in the field.",
+            "Simulated: it contains only what the models contain. A method that works here need "
+            "not work on a real machine.",
+            "Grades are as frequent as in the recipe, not as in the field.",
         ]
     else:
-        texts.append("Measured: labels are as they were given on import and not checked.")
+        texts.append("Measured: labels are as given on import and were not checked.")
         unknown = int((facts.manifest["grade"] < 0).sum())
         if unknown:
             texts.append(f"The grade of {unknown} record(s) is not known.")
@@ -425,14 +425,14 @@ def snippets(file: str, label: str) -> tuple[Code, ...]:
     Parameters
     ----------
     file : str
-        Its name.
+        Name of the file.
     label : str
-        Manifest column to learn.
+        Manifest column to predict.
 
     Returns
     -------
     tuple of Code
-        pandas, PyTorch, Hugging Face.
+        Snippets for pandas, PyTorch, Hugging Face.
 
     Examples
     --------
@@ -486,7 +486,7 @@ signal = usable.with_format("numpy")[0]["signal"]
 
 
 def card_markdown(card: Card) -> str:
-    """The page as Markdown; pictures are left out.
+    """The page as Markdown, without pictures.
 
     Examples
     --------
@@ -530,12 +530,12 @@ def _markdown_row(cells: Sequence[str]) -> str:
 
 
 def card_html(card: Card) -> str:
-    """The page as one self-contained file: no script, no link, pictures inside.
+    """The page as one self-contained file: no scripts, no links, embedded pictures.
 
     Parameters
     ----------
     card : Card
-        From :func:`data_card`.
+        Card from :func:`data_card`.
 
     Returns
     -------
@@ -553,4 +553,4 @@ def card_html(card: Card) -> str:
 
 
 _KINDS = {str: "text", list: "list", CardTable: "table", Code: "code", CardPicture: "picture"}
-"""What the template calls each block."""
+"""Names of the blocks in the template."""

@@ -1,4 +1,4 @@
-"""A deep check of a scene as a table for people and for programs."""
+"""Deep check of a scene as a table, for people and for programs."""
 
 import math
 import textwrap
@@ -10,16 +10,16 @@ from ...sim.deep_check.rows import Figure, Quantity
 _MARKS = {True: "usual", False: "UNUSUAL"}
 _INDENT = "    "
 _WIDTH = 100
-_NOTHING = 1e-9  # rounding of a sum that is zero
+_NOTHING = 1e-9  # rounding error of a sum that is zero
 
 
 def deep_check_text(name: str, found: DeepCheck) -> str:
-    """Table of all figures, then what is unusual with its cure.
+    """Table of all figures, then the unusual ones with their cures.
 
     Parameters
     ----------
     name : str
-        Of the scene.
+        Name of the scene.
     found : DeepCheck
 
     Returns
@@ -76,7 +76,7 @@ def _cure(figure: Figure) -> str:
 
 
 def usual_range(quantity: Quantity) -> str:
-    """Range of a quantity, one-sided where it has one end.
+    """Range of a quantity; one-sided if it has only one end.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def usual_range(quantity: Quantity) -> str:
 
 
 def number(value: float) -> str:
-    """Three digits, without an exponent where there is room.
+    """Three digits, without an exponent if that is short.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def number(value: float) -> str:
 
 
 def deep_check_table(found: DeepCheck) -> dict[str, Any]:
-    """The same as JSON: an end that a range does not have is null.
+    """The same for JSON: a missing end of a range is null.
 
     Parameters
     ----------

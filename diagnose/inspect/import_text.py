@@ -1,4 +1,4 @@
-"""What an import made, and what files hold, in words."""
+"""Results of an import, and contents of files, as text."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,12 +11,12 @@ _SHOWN = 3  # pairs of twins
 
 
 def imported_table(summary: ImportSummary) -> dict[str, Any]:
-    """A summary ready for JSON; names say their SI unit.
+    """A summary ready for JSON; names include the SI unit.
 
     Parameters
     ----------
     summary : ImportSummary
-        Of :func:`~..datasets.import_set.import_recordings`.
+        Summary from :func:`~..datasets.import_set.import_recordings`.
     """
     value = asdict(summary) | {"path": str(summary.path)}
     for name, unit in (
@@ -35,7 +35,7 @@ def imported_text(summary: ImportSummary) -> str:
     Parameters
     ----------
     summary : ImportSummary
-        Of :func:`~..datasets.import_set.import_recordings`.
+        Summary from :func:`~..datasets.import_set.import_recordings`.
     """
     grades = [f"{count} of grade {grade}" for grade, count in summary.grades.items() if grade >= 0]
     return "\n".join(
@@ -58,7 +58,7 @@ def _span(values: Sequence[float]) -> str:
 
 
 def empty_text(summary: ImportSummary) -> str:
-    """Channels that were left out because they hold no number; empty where there are none.
+    """Channels left out because they hold no numbers; empty if there are none.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def empty_text(summary: ImportSummary) -> str:
 
 def _omissions(summary: ImportSummary) -> list[str]:
     lines = [
-        f"  {count} with status {status}, which features leaves out"
+        f"  {count} with status {status}, left out of features"
         for status, count in summary.statuses.items()
         if status != "ok"
     ]
@@ -90,7 +90,7 @@ def _omissions(summary: ImportSummary) -> list[str]:
 
 def _twin_lines(twins: Sequence[tuple[str, str]]) -> list[str]:
     lines = [
-        f"  {one} and {other} hold a same record and count as two machines: give them one group"
+        f"  {one} and {other} hold the same record and count as two machines: give them one group"
         for one, other in twins[:_SHOWN]
     ]
     more = len(twins) - _SHOWN
@@ -98,12 +98,12 @@ def _twin_lines(twins: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def contents_text(found: Sequence[Mapping[str, Any]]) -> str:
-    """What files hold, a paragraph for each.
+    """Contents of files, a paragraph for each.
 
     Parameters
     ----------
     found : sequence of mapping
-        Of :func:`~..datasets.importers.list_contents`.
+        Contents from :func:`~..datasets.importers.list_contents`.
     """
     lines = []
     for item in found:

@@ -1,4 +1,4 @@
-"""What a file is, checked while reading it."""
+"""Description of a file, checked while reading it."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -48,22 +48,22 @@ def describe(
     path : Path
         A data set or model of this program, or a measured file.
     options : SourceOptions, optional
-        What a measured file does not declare.
+        Declarations that a measured file lacks.
     tacho : str, optional
         Name of the tacho channel of a measured file.
     pulses_per_revolution : int
-        Of that tacho.
+        Pulses of the tacho in one revolution.
 
     Returns
     -------
     dict
-        ``kind`` first; names in snake case, numbers SI with the unit in the name, None where
+        ``kind`` first; names in snake case, numbers in SI with the unit in the name, None if
         unknown.
 
     Raises
     ------
     DataError, ModelError
-        The file is missing, damaged, or of no known kind.
+        If the file is missing, damaged, or of unknown kind.
     """
     if not path.is_file():
         raise DataError(missing_file(path))
@@ -77,12 +77,12 @@ def describe(
 
 
 def description_text(described: Mapping[str, Any]) -> str:
-    """A description as lines of name and value, in the units people use.
+    """A description as lines of name and value, in usual units.
 
     Parameters
     ----------
     described : mapping
-        From :func:`describe`.
+        Description from :func:`describe`.
 
     Examples
     --------
@@ -93,12 +93,12 @@ def description_text(described: Mapping[str, Any]) -> str:
     facts = {key: value for key, value in described.items() if key != "warnings"}
     lines = dict(_line(key, value) for key, value in facts.items())
     width = max(len(name) for name in lines)
-    told = [f"{name:{width}}  {value}" for name, value in lines.items()]
-    return "\n".join([*told, *(f"warning: {text}" for text in described.get("warnings", ()))])
+    listed = [f"{name:{width}}  {value}" for name, value in lines.items()]
+    return "\n".join([*listed, *(f"warning: {text}" for text in described.get("warnings", ()))])
 
 
 def _line(key: str, value: Any) -> tuple[str, str]:
-    """Name and value of one entry, for people."""
+    """Name and value of one entry as text."""
     if value is None or value == "" or value == {}:
         return key.removesuffix("_m").replace("_", " "), "none"
     if key == "channels":
@@ -117,7 +117,7 @@ def _line(key: str, value: Any) -> tuple[str, str]:
 
 
 _UNITS = (("_hz", "Hz", 1.0), ("_s", "s", 1.0), ("_m", "mm", 1e3))
-"""Ending of a name, unit for people, factor to it."""
+"""Ending of a name, usual unit, and factor to it."""
 
 
 def _quantity(value: Any, unit: str, scale: float) -> str:
@@ -192,7 +192,7 @@ def _describe_data(path: Path) -> dict[str, Any]:
     with DataSet(path) as data:
         head, manifest = data.attributes, data.manifest
         warnings = _Warnings(scene_in(head), single=len(data) == 1)
-        for index in range(len(data)):  # every signal against its checksum
+        for index in range(len(data)):  # check every signal against its checksum
             warnings.look(index, data[index])
         first = data[0]
     return {
@@ -222,20 +222,20 @@ def _describe_data(path: Path) -> dict[str, Any]:
 
 
 class _Warnings:
-    """What of the records of a file is hardly meant: one text for every check, and a count."""
+    """Implausible properties of the records of a file: one text per check, and a count."""
 
     def __init__(self, scene: Scene | None, *, single: bool) -> None:
         self.scene, self.single = scene, single
         self.found: dict[str, list[tuple[int, str]]] = {}
 
     def look(self, index: int, recording: Recording) -> None:
-        """Note what is in doubt of one record; one that failed is told by its status."""
+        """Collect the doubts about one record; failed ones are reported by their status."""
         if recording.row.get("status", "ok") == "ok":
             for check, text in _doubts(recording, self.scene, run=self.single):
                 self.found.setdefault(check, []).append((index, text))
 
     def texts(self) -> list[str]:
-        """All of them; of a set, each check with its first record."""
+        """All warnings; for a set, each check with its first record."""
         if self.single:
             return [text for found in self.found.values() for _, text in found]
         return [
@@ -247,7 +247,7 @@ class _Warnings:
 def _doubts(
     recording: Recording, scene: Scene | None = None, *, run: bool = False
 ) -> list[tuple[str, str]]:
-    """Check and text of what is hardly meant; of a measured one saturation, gaps and hum too."""
+    """Check and text of each doubt; for measured records also saturation, gaps and hum."""
     texts = [
         (doubt.check, doubt.text) for doubt in recording_doubts(recording, scene, scene_too=run)
     ]
@@ -299,45 +299,44 @@ def plot_file(
     interactive: bool = False,
     force: bool = True,
 ) -> dict[str, Any]:
-    """Draw a recording of a file into a picture, or into a page of curves to zoom and measure.
+    """Draw a recording of a file into a picture, or into a page with zoom and cursors.
 
     Parameters
     ----------
     path : Path
-        Data set, of which `options` name the record, or measured file.
+        Data set, with the record chosen in `options`, or measured file.
     picture : Path
-        ``.png``, ``.svg`` or ``.pdf``; of an interactive page ``.html``.
+        ``.png``, ``.svg`` or ``.pdf``; for an interactive page ``.html``.
     options, tacho, pulses_per_revolution
-        As of :func:`describe`.
+        As for :func:`describe`.
     kind : str
-        A key of :data:`.pictures.kinds.KINDS`, or ``auto`` for all that the recording supports.
+        Key of :data:`.pictures.kinds.KINDS`, or ``auto`` for all that the recording supports.
     draw : sequence of str
         Channels; all by default.
     force_channel : str, optional
         Force of a transfer function; the only channel in N by default.
     speed_hz : float, optional
-        Shaft speed, where there is no tacho; it goes before the one in the file [Hz].
+        Shaft speed if there is no tacho [Hz]; it takes precedence over that in the file.
     bearing : sequence of float, optional
-        Rollers, their diameter, pitch diameter (one unit for both) and, if it is not 0, contact
-        angle [deg].
+        Number and diameter of the rollers, pitch diameter (any one unit for both) and, if it is not
+        0, contact angle [deg].
     exponential : float
-        What the exponential window of an impact test has sunk to at the end of a block [-].
+        Value of the exponential window of an impact test at the end of a block [-].
     interactive : bool
-        Write a page; `kind` is then ``auto`` or a key of
-        :data:`.pictures.zoom_curves.ZOOM_KINDS`.
+        Write a page; `kind` is then ``auto`` or a key of :data:`.pictures.zoom_curves.ZOOM_KINDS`.
     force : bool
         Replace an existing file.
 
     Returns
     -------
     dict
-        ``path``, ``drawn`` (kinds) and ``left_out`` (kind to what the recording lacks for it).
+        ``path``, ``drawn`` (kinds) and ``left_out`` (what the recording lacks, by kind).
 
     Raises
     ------
     DataError
-        The file is a model or cannot be read, an argument is out of its bounds, the recording
-        lacks what the kind needs, or Bokeh is not installed for an interactive page.
+        If the file is a model or cannot be read, an argument is out of bounds, the recording lacks
+        what the kind needs, or Bokeh is not installed for an interactive page.
     """
     if interactive:
         require_bokeh()
@@ -362,7 +361,7 @@ def plot_file(
 
 
 def _save_zoom(view: View, kind: str, page: Path, *, force: bool) -> dict[str, Any]:
-    """Write the page of curves, with the picture for paper; what it holds, as `plot_file`."""
+    """Write the page of curves with a still picture for printing; return as `plot_file` does."""
     curves, left_out = zoom_curves(view, kind)
     stills = [
         (panel.caption, page_image(panel_figure(panel), colours=STILL_COLOURS))
@@ -375,7 +374,7 @@ def _save_zoom(view: View, kind: str, page: Path, *, force: bool) -> dict[str, A
 
 
 def picture_text(made: Mapping[str, Any]) -> str:
-    """What :func:`plot_file` drew, for people.
+    """Text about what :func:`plot_file` drew.
 
     Examples
     --------
@@ -389,7 +388,7 @@ def picture_text(made: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-# --- the library that computes Fourier transforms
+# --- FFT backend
 
 _TIMED: tuple[tuple[fft.Kind, int, int, str], ...] = (
     ("rfft", 600, 256, "float32"),
@@ -402,23 +401,23 @@ _TIMED: tuple[tuple[fft.Kind, int, int, str], ...] = (
     ("rfft", 1, 122_880, "float32"),
     ("rfft", 3, 25_601, "float32"),
 )
-"""Transform, rows, length [samples] and type of what the features transform."""
+"""Transform, rows, length [samples] and type of typical transforms of the features."""
 
 
 def describe_fft() -> dict[str, Any]:
-    """Describe who computes Fourier transforms, both libraries timed on this machine.
+    """Describe the FFT backend, with both libraries timed on this machine.
 
     Returns
     -------
     dict
-        Mode, versions and the wisdom file; under ``choices`` one dict for each of a few
-        transforms: the engine chosen and the least time of each [s]. Versions and times of a
-        library that is not installed are None.
+        Mode, versions and the wisdom file; under ``choices`` one dict for each of a few transforms:
+        the engine chosen and the shortest time of each [s]. Versions and times of a library that is
+        not installed are None.
 
     Raises
     ------
     FFTModeError
-        The environment asks for a mode that does not exist.
+        If the environment variable names no mode.
     """
     library = fft.fftw_library()
     path = fft.wisdom_file()
@@ -437,7 +436,7 @@ def describe_fft() -> dict[str, Any]:
 
 
 def _choice(kind: fft.Kind, rows: int, n: int, dtype: str) -> dict[str, Any]:
-    """One transform: who is chosen, and the time of both [s]."""
+    """One transform: the engine chosen, and the times of both [s]."""
     columns = n // 2 + 1 if kind == "irfft" else n
     data = np.random.default_rng(0).standard_normal((rows, columns)).astype(dtype)
     engines: dict[str, float | None] = {"scipy": None, "fftw": None}
@@ -458,7 +457,7 @@ _REPEATS = 15
 
 
 def _least_time(function: Callable[[], Any]) -> float:
-    """Least duration of several calls [s]; the first, which may plan, is not counted."""
+    """Shortest duration of several calls [s]; the first, which may plan, is not counted."""
     function()
     least = float("inf")
     for _ in range(_REPEATS):
@@ -469,7 +468,7 @@ def _least_time(function: Callable[[], Any]) -> float:
 
 
 def fft_text(facts: Mapping[str, Any]) -> str:
-    """What :func:`describe_fft` found, for people.
+    """Text about what :func:`describe_fft` found.
 
     Examples
     --------

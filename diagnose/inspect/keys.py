@@ -1,4 +1,4 @@
-"""Every key of a scene or a recipe: meaning, unit, range, default, rungs; and which are meant."""
+"""All keys of a scene or a recipe: meaning, unit, range, default, rungs; and their search."""
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
@@ -29,19 +29,19 @@ class Key:
     Attributes
     ----------
     path : str
-        Dotted; ``*`` stands for the number or name of a list entry, or for a name that is free.
+        Dotted path; ``*`` stands for the number or name of a list entry, or for a free name.
     words : str
-        What it means.
+        Meaning.
     kind : str
-        What is written there: number, whole number, text, true or false, a list, a table.
+        Type of the value: number, whole number, text, true or false, a list, a table.
     unit : str
-        SI unit of a bare number; empty where it has none.
+        SI unit of a bare number; empty if it has none.
     units : tuple of str
         Units that a text may carry.
     bounds : str
-        As ``> 0, <= 100 m``; empty without any.
+        Bounds, as ``> 0, <= 100 m``; empty without any.
     default : str
-        ``required`` where it must be given.
+        Default; ``required`` if it must be given.
     choices : tuple of str
         Words to choose from.
     rungs : tuple of Rung
@@ -60,17 +60,17 @@ class Key:
 
     @property
     def name(self) -> str:
-        """Last name of its path."""
+        """Last name of the path."""
         return self.path.removesuffix(".*").rpartition(".")[2]
 
     @property
     def table(self) -> bool:
-        """Whether it holds keys of its own."""
+        """Whether it is a table."""
         return self.kind in _TABLE_KINDS
 
 
 def keys_of(model: type[BaseModel]) -> list[Key]:
-    """Every key of a scene or recipe, each table before the keys in it.
+    """All keys of a scene or recipe, each table before its keys.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
 
 
 DIFFERING = "what differs"
-"""Default of a table that is merged over the scene's own table of that name."""
+"""Default of a table that is merged over the scene's table of that name."""
 
 _Ladders = tuple[tuple[Rung, ...], ...]
 
@@ -128,7 +128,7 @@ def _is_partial(field: FieldInfo) -> bool:
 
 
 def _value(field: FieldInfo, name: str, given: Any) -> Any:
-    """Default of a field: that of its table where the table has one, else its own."""
+    """Default of a field: that of its table if the table has one, or else its own."""
     if given is not None:
         return getattr(given, name)
     return None if field.is_required() else field.get_default(call_default_factory=True)
@@ -165,7 +165,7 @@ def _leaf(path: str, field: FieldInfo, value: Any, ladders: _Ladders) -> Key:
 
 
 def _flat(marks: Iterable[Any]) -> Iterator[Any]:
-    """Metadata with those of fields inside of an annotation."""
+    """Metadata, including those of fields inside an annotation."""
     for mark in marks:
         if isinstance(mark, FieldInfo):
             yield from _flat(mark.metadata)
@@ -180,7 +180,7 @@ def _bounds(marks: Iterable[Any], unit: str) -> str:
 
 
 def _number(value: float, unit: str, digits: int) -> str:
-    if unit == "s" and abs(value) >= 1:  # nobody says kiloseconds
+    if unit == "s" and abs(value) >= 1:  # kiloseconds are not in use
         return f"{plain(value, digits)} s"
     return si_text(value, unit, digits)
 
@@ -194,7 +194,7 @@ def _choices(annotation: Any) -> Iterator[str]:
 
 
 def _rungs(choices: tuple[str, ...], ladders: _Ladders) -> tuple[Rung, ...]:
-    """Rows of the ladder that has all the choices as its rungs, if there is one."""
+    """Rows of the ladder whose rungs include all the choices, if there is one."""
     for ladder in ladders:
         if choices and {*choices} <= {rung.name for rung in ladder}:
             return tuple(rung for rung in ladder if rung.name in choices)
@@ -222,7 +222,7 @@ def _kind(annotation: Any) -> str:
 
 
 def _shown(value: Any, unit: str) -> str:
-    """A value as one would write it."""
+    """A value as written in a file."""
     if value is None or value == () or value == {}:
         return "none"
     if isinstance(value, bool):
@@ -238,21 +238,21 @@ def _shown(value: Any, unit: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class FoundKeys:
-    """Keys that were asked for.
+    """Result of a search for keys.
 
     Attributes
     ----------
     subject : str
         Machine, or ``recipe``.
     words : str
-        What it is, in one sentence.
+        Description in one sentence.
     keys : tuple of Key
     values : mapping of str to str
-        Path -> what the scene that was asked for has there.
+        Value in the given scene by path.
     scene : str
-        Its name; empty where only the machine was named.
+        Name of the scene; empty if only the machine was given.
     single : bool
-        One key was asked for, so that all of it is told.
+        Whether one key was requested, so that all its details are shown.
     """
 
     subject: str
@@ -269,10 +269,10 @@ def found_keys(subject: str = "", key: str = "") -> list[FoundKeys]:
     Parameters
     ----------
     subject : str
-        Machine (``pump`` or its whole name), built-in scene or file; or a key, with or without a
-        machine before it, where `key` is empty.
+        Machine (``pump`` or its full name), built-in scene or file; or, if `key` is empty, a key,
+        with or without a machine before it.
     key : str
-        Dotted path, its end, or a table; entries of lists by number, name, ``*`` or left out.
+        Dotted path, its end, or a table; list entries by number, name, ``*`` or left out.
 
     Returns
     -------
@@ -282,7 +282,7 @@ def found_keys(subject: str = "", key: str = "") -> list[FoundKeys]:
     Raises
     ------
     SceneError
-        Nothing is called so; the nearest names are told.
+        If nothing has that name; the nearest names are given.
 
     Examples
     --------
@@ -308,7 +308,7 @@ def found_keys(subject: str = "", key: str = "") -> list[FoundKeys]:
 def found_recipe_keys(key: str = "") -> FoundKeys:
     """Keys of a recipe, or one of them; see :func:`found_keys`."""
     rows = [*_EXTENDING, *keys_of(RecipeTable)]
-    return _asked("recipe", "What data sets are drawn from.", rows, key, {})
+    return _result("recipe", "What data sets are drawn from.", rows, key, {})
 
 
 _EXTENDING = (
@@ -320,7 +320,7 @@ _EXTENDING = (
         words="paths and names of draws of the extended recipe that are left out",
     ),
 )
-"""Keys of a recipe file that are gone once it is read."""
+"""Keys of a recipe file that disappear when it is read."""
 
 
 def _of_scene(scene: Scene, name: str, key: str) -> FoundKeys:
@@ -328,26 +328,28 @@ def _of_scene(scene: Scene, name: str, key: str) -> FoundKeys:
 
 
 def keys_found(kind: type[Scene], key: str, scene: Scene | None = None) -> FoundKeys:
-    """Keys of a machine that are meant, with the values of a scene where there is one."""
+    """Matching keys of a machine, with the values of a scene if there is one."""
     rows = keys_of(kind)
     values = {} if scene is None else {row.path: _written(scene, row) for row in rows}
     about = (kind.__doc__ or "").partition("\n")[0]
-    return _asked(short_name(kind), about, rows, key, {k: v for k, v in values.items() if v})
+    return _result(short_name(kind), about, rows, key, {k: v for k, v in values.items() if v})
 
 
-def _asked(
+def _result(
     subject: str, words: str, rows: list[Key], key: str, values: Mapping[str, str]
 ) -> FoundKeys:
-    asked = matching(rows, key) if key else rows
-    if not asked:
+    matched = matching(rows, key) if key else rows
+    if not matched:
         near = _near(key, [row.path for row in rows])
         raise SceneError(subject, [f"{key} is no key of a {subject}{near}"])
-    single = bool(key) and not any(row.table for row in asked)
-    return FoundKeys(subject=subject, words=words, keys=tuple(asked), values=values, single=single)
+    single = bool(key) and not any(row.table for row in matched)
+    return FoundKeys(
+        subject=subject, words=words, keys=tuple(matched), values=values, single=single
+    )
 
 
-def matching(keys: list[Key], asked: str) -> list[Key]:
-    """Keys at a path, in a table, or whose paths end so; empty where there is none.
+def matching(keys: list[Key], wanted: str) -> list[Key]:
+    """Keys at a path, in a table, or whose paths end with the text; empty if there are none.
 
     Examples
     --------
@@ -355,7 +357,7 @@ def matching(keys: list[Key], asked: str) -> list[Key]:
     >>> [key.path for key in matching(keys_of(ShaftScene), "bearings.aft.sag")]
     ['bearings.*.sag']
     """
-    words = asked.split(".")
+    words = wanted.split(".")
     bare = [word for word in words if word != "*" and not word.isdecimal()]
     paths = [(key, [word for word in key.path.split(".") if word != "*"]) for key in keys]
     ways = (
@@ -367,11 +369,11 @@ def matching(keys: list[Key], asked: str) -> list[Key]:
     return next(filter(None, ways), []) if bare else []
 
 
-def _leads(asked: list[str], path: list[str], *, named: bool) -> bool:
-    """Whether a path begins so, entries of lists by number and, if so wished, by any name."""
-    return len(asked) <= len(path) and all(
+def _leads(wanted: list[str], path: list[str], *, named: bool) -> bool:
+    """Whether a path begins with the given one; list entries by number, optionally by name."""
+    return len(wanted) <= len(path) and all(
         word == there or (there == "*" and (named or word.isdecimal()))
-        for word, there in zip(asked, path, strict=False)
+        for word, there in zip(wanted, path, strict=False)
     )
 
 
@@ -386,7 +388,7 @@ def _near(word: str, names: Iterable[str]) -> str:
 
 
 def _written(scene: Scene, key: Key) -> str:
-    """What a scene has at a key, of lists the different values; empty where it has nothing."""
+    """Value of a scene at a key, different values for lists; empty if it has none."""
     if key.table:
         return ""
     values = _reached(scene, key.path.split("."))

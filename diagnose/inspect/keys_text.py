@@ -1,4 +1,4 @@
-"""Keys of scenes and recipes in words: as text, as a table, as the page of them all.
+"""Keys of scenes and recipes: as text, as a table, as a page of all keys.
 
 ``python -m wearstate.diagnose.inspect.keys_text`` prints ``docs/keys.md``.
 """
@@ -18,7 +18,7 @@ _NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def subjects_text() -> str:
-    """The machines, and how to ask for their keys."""
+    """The machines, and how to show their keys."""
     names = {
         short_name(kind): (kind.__doc__ or "").partition("\n")[0] for kind in MACHINES.values()
     }
@@ -36,7 +36,7 @@ def subjects_text() -> str:
 
 
 def explained(found: FoundKeys) -> str:
-    """Keys as text: one with all that is known of it, several as one line each.
+    """Keys as text: one with all its details, several as one line each.
 
     Parameters
     ----------
@@ -76,10 +76,10 @@ def _wrapped(text: str, indent: int) -> list[str]:
 
 
 def _once(keys: Iterable[Key]) -> list[tuple[Key, Key | None]]:
-    """Keys, a table whose keys have all been told by those of another table without them."""
+    """Keys, with a table whose keys equal those of an earlier one given without them."""
     rows = list(keys)
     own = {row.path: row for row in rows}
-    told: dict[str, Key] = {}  # a rung cannot be hashed
+    first_with: dict[str, Key] = {}  # a rung cannot be hashed
     result: list[tuple[Key, Key | None]] = []
     skipped = "\0"
     for row in rows:
@@ -90,7 +90,7 @@ def _once(keys: Iterable[Key]) -> list[tuple[Key, Key | None]]:
             for each in rows
             if row.table and each.path.startswith(f"{row.path}.")
         ]
-        twin = told.setdefault(repr(inside), row) if inside else row
+        twin = first_with.setdefault(repr(inside), row) if inside else row
         if row.default == DIFFERING:
             twin = own.get(row.name, row)
         result.append((row, None if twin is row else twin))
@@ -100,7 +100,7 @@ def _once(keys: Iterable[Key]) -> list[tuple[Key, Key | None]]:
 
 
 def _header(key: Key) -> str:
-    """As in TOML; a table of a list entry by the names alone."""
+    """Header as in TOML; for a table of a list entry only the names."""
     inside = key.path.removesuffix(".*")
     name = inside.replace(".*", "")
     if key.kind == TABLES:
@@ -122,7 +122,7 @@ def _spec(key: Key, values: Mapping[str, str]) -> str:
 
 
 def _whole(key: Key, found: FoundKeys) -> str:
-    """Everything about one key."""
+    """All details of one key."""
     here = found.values.get(key.path, "not given")
     rows = [
         ("", key.words),
@@ -148,7 +148,7 @@ _COST = "cost: tabulated time of a step of one throw or of one solve of a film, 
 
 
 def _rung_rows(rung: Rung) -> list[tuple[str, str]]:
-    """What is told of a rung."""
+    """Details of a rung."""
     cost = si_text(1e-9 * rung.nanoseconds_per_step, "s") if rung.nanoseconds_per_step else "none"
     rows = [
         ("assumes", rung.assumes),
@@ -181,7 +181,7 @@ def keys_table(found: Iterable[FoundKeys]) -> dict[str, Any]:
 
 
 def keys_page() -> str:
-    """``docs/keys.md``: every key of every machine and of a recipe."""
+    """``docs/keys.md``: all keys of all machines and of a recipe."""
     parts = [_PAGE_HEAD]
     for kind in MACHINES.values():
         parts.append(_section(keys_found(kind, "")))
@@ -197,8 +197,8 @@ Written by `python -m wearstate.diagnose.inspect.keys_text`. The same on the com
 
 A bare number is SI; a text carries its unit, such as `"0.25 mm"`. On the command line a key is its
 dotted path, with entries of lists by number (from 0) or by name:
-`wearstate simulate shaft-rig --set bearings.aft.sag="1 mm"`. Rungs stand cheapest first; their cost
-is the tabulated time of a step of one throw or of one film solve."""
+`wearstate simulate shaft-rig --set bearings.aft.sag="1 mm"`. Rungs are ordered by cost,
+cheapest first; the cost is the tabulated time of a step of one throw or of one film solve."""
 
 
 def _section(found: FoundKeys) -> str:
@@ -227,9 +227,9 @@ def _page_rows(found: FoundKeys) -> Iterator[str]:
 
 
 def _rung_row(rung: Rung) -> str:
-    told = dict(_rung_rows(rung))
+    texts = dict(_rung_rows(rung))
     names = ("assumes", "valid", "needs", "cost", "reference")
-    return f"| {rung.name} | " + " | ".join(_cell(told.get(name, "")) for name in names) + " |"
+    return f"| {rung.name} | " + " | ".join(_cell(texts.get(name, "")) for name in names) + " |"
 
 
 _RUNG_HEAD = ("| rung | assumes | valid | needs | cost | reference |", "|---|---|---|---|---|---|")

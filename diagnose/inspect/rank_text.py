@@ -1,4 +1,4 @@
-"""A ranking of features in words, as a table, as CSV and as a page with pictures."""
+"""Feature ranking as text, as a table, as CSV and as a page with pictures."""
 
 import math
 from collections.abc import Mapping
@@ -22,9 +22,9 @@ from ..pages.si_text import plain
 from ..pages.words import quantity_name
 
 SHOWN = 20
-"""Features in the table of a terminal; also those whose cost is measured."""
+"""Features in the terminal table; only their cost is measured."""
 
-_OPEN = 60  # features of a page that are shown, and printed, without asking for more
+_OPEN = 60  # features of a page that are visible, and printed, without unfolding
 _DRAWN = 6  # features whose values are drawn
 
 
@@ -35,15 +35,15 @@ class RankedSet:
     Attributes
     ----------
     name : str
-        Of the data set.
+        Name of the data set.
     target : str
-        Column of its manifest.
+        Manifest column predicted.
     classes : bool
-        The target names conditions.
+        Whether the target names conditions.
     table : FeatureTable
     ranking : Ranking
     costs_ms : mapping of str to float
-        Time that a feature alone takes on one recording [ms], of those shown.
+        Time to compute a feature alone on one recording [ms], for those shown.
     """
 
     name: str
@@ -57,7 +57,7 @@ class RankedSet:
 def rank_set(
     path: Path, table: FeatureTable, choice: FeatureSelection, *, target: str | None = None
 ) -> RankedSet:
-    """Rank the features of a data set against its first severity, or another label.
+    """Rank the features of a data set by its first severity, or another label.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ def rank_set(
     table : FeatureTable
         Its features.
     choice : FeatureSelection
-        With which the table was made; the costs are measured with it.
+        Selection with which the table was made, also used to measure the costs.
     target : str, optional
         Column of the manifest.
 
     Raises
     ------
     DataError
-        There is no such column, or nothing varies in it.
+        If there is no such column, or its values do not vary.
     """
     with DataSet(path) as data:
         severities = data.attributes.severities
@@ -110,7 +110,7 @@ def rank_set(
 
 
 def _labelled(table: FeatureTable, column: str) -> FeatureTable:
-    """The records of which the target is known."""
+    """The records whose target is known."""
     known = table.manifest[column].notna().to_numpy()
     manifest = table.manifest[known].reset_index(drop=True)
     return replace(table, values=table.values[known], manifest=manifest, lacking={})
@@ -130,13 +130,14 @@ _COLUMNS = {
 
 
 def rank_lines(found: RankedSet) -> list[str]:
-    """What the ranking says, as sentences."""
+    """Results of the ranking in sentences."""
     ranking = found.ranking
     best = ranking.features[0]
     lines = [
-        f"{best.name} says most about {found.target}: {plain(best.information)} bits",
-        f"{len(ranking.informative)} of {len(ranking.features)} features say more than chance "
-        f"({plain(ranking.chance)} bits; a shuffled target stays below it in 95 of 100 features)",
+        f"{best.name} is most informative about {found.target}: {plain(best.information)} bits",
+        f"{len(ranking.informative)} of {len(ranking.features)} features are more informative than "
+        f"chance ({plain(ranking.chance)} bits; a shuffled target stays below it in 95 of 100 "
+        "features)",
     ]
     if not found.classes and ranking.n_followed < ranking.n_machines:
         lines.append(
@@ -147,7 +148,7 @@ def rank_lines(found: RankedSet) -> list[str]:
 
 
 def rank_text(found: RankedSet) -> str:
-    """The ranking for a terminal: the first features, then what it says."""
+    """The ranking for a terminal: the first features, then the results in sentences."""
     width = max(len(each.name) for each in found.ranking.features[:SHOWN])
     heads = [*_used(found).values(), "cost [ms]"]
     lines = [
@@ -164,7 +165,7 @@ def rank_text(found: RankedSet) -> str:
 
 
 def _used(found: RankedSet) -> dict[str, str]:
-    """Columns in which something is known."""
+    """Columns with known values."""
     rows = found.ranking.features
     return {
         name: head
@@ -210,7 +211,7 @@ def save_rank(found: RankedSet, path: Path, *, force: bool = True) -> None:
 
 
 def rank_html(found: RankedSet) -> str:
-    """One self-contained page: what it says, pictures, every feature."""
+    """One self-contained page: results, pictures, all features."""
     return render(
         "rank.html.j2",
         name=found.name,
@@ -245,7 +246,7 @@ def _axis_words(found: RankedSet) -> str:
 
 
 def bar_figure(found: RankedSet) -> Any:
-    """Information of the first features, and what chance reaches."""
+    """Information of the first features, and the chance level."""
     from matplotlib.figure import Figure
 
     rows = found.ranking.features[:SHOWN]
@@ -280,7 +281,7 @@ def value_images(found: RankedSet) -> list[PageImage]:
 
 
 def _places(found: RankedSet) -> tuple[NDArray[np.float64], list[str]]:
-    """Where each record lies along the target, and the names of the conditions."""
+    """Position of each record along the target, and the names of the conditions."""
     values = found.table.manifest[found.target].to_numpy()
     if found.classes:
         names, number = np.unique(values, return_inverse=True)
@@ -293,7 +294,7 @@ def _text(value: Any) -> str:
     return value.decode(errors="backslashreplace") if isinstance(value, bytes) else str(value)
 
 
-_MOST_LINES = 12  # machines whose records are joined; more would be a felt
+_MOST_LINES = 12  # machines whose records are joined; more would be illegible
 
 
 def _draw_values(

@@ -1,4 +1,4 @@
-"""What a recipe would make, before anything is simulated: counted, in words and as a picture."""
+"""Preview of a recipe before any simulation: counts, as text and as a picture."""
 
 from collections.abc import Mapping, Sequence
 from itertools import islice
@@ -22,11 +22,11 @@ from ..pages.picture import PAGE_WIDTH
 from ..pictures.panel import COLOURS
 
 MOST_DRAWN = 1000
-"""Records that a preview draws; more tell the same."""
+"""Largest number of records drawn for a preview; more give the same picture."""
 
 _COSTED = 16  # drawn scenes whose cost is looked up
-_ROW_BYTES = 64  # of a manifest's row: name, group, seed, status, checksum
-_COLUMNS = 2  # of panels: text is read on a phone
+_ROW_BYTES = 64  # in a row of the manifest: name, group, seed, status, checksum
+_COLUMNS = 2  # of panels: readable on a phone
 _HEAD, _ROW = 0.8, 1.75  # inch, of the heading and of a row of panels
 _LEVELS = ("severity", "machine", "record", "confounder")
 
@@ -38,11 +38,11 @@ def preview(recipe: Recipe, n: int | None = None, *, seed: int = 0, cores: int =
     ----------
     recipe : Recipe
     n : int, optional
-        Records; the recipe's own number unless given.
+        Number of records; by default the recipe's own.
     seed : int
-        Of the data set.
+        Seed of the data set.
     cores : int
-        That would simulate.
+        Number of simulating cores.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def preview(recipe: Recipe, n: int | None = None, *, seed: int = 0, cores: int =
     Raises
     ------
     RecipeError, SceneError
-        `n` or `seed` is out of bounds, or a drawn combination is no valid scene.
+        If `n` or `seed` is out of bounds, or a drawn combination is not a valid scene.
 
     Examples
     --------
@@ -72,16 +72,16 @@ class Preview:
     ----------
     recipe : Recipe
     n : int
-        Records of the data set.
+        Number of records of the data set.
     samples : sequence of Sample
-        Those that were drawn, all or the first.
+        Samples drawn: all, or the first ones.
     cores : int
-        That would simulate.
+        Number of simulating cores.
 
     Attributes
     ----------
     table : dict
-        Ready for JSON; names say their SI unit, drawn values are in SI.
+        Summary ready for JSON; names include the SI unit, drawn values are in SI.
     """
 
     def __init__(self, recipe: Recipe, n: int, samples: Sequence[Sample], cores: int) -> None:
@@ -99,7 +99,7 @@ class Preview:
         }
 
     def values(self, path: str) -> NDArray[np.float64]:
-        """Numbers drawn at a path of the scene, NaN where none was [shape=(n_drawn,)]."""
+        """Numbers drawn at a path of the scene, NaN if none was [shape=(n_drawn,)]."""
         return np.array([sample.drawn.get(path, np.nan) for sample in self.samples], dtype=float)
 
 
@@ -127,7 +127,7 @@ def _sizes(recipe: Recipe, n: int) -> dict[str, Any]:
 
 
 def _costs(recipe: Recipe, n: int, samples: Sequence[Sample], cores: int) -> dict[str, Any]:
-    """Rungs as written and what they cost by the tables, which machines differ from."""
+    """Rungs as written and their tabulated cost, and the machines that differ."""
     scene = recipe.scene
     costs = [cost_of(sample.scene) for sample in samples[:_COSTED]]
     return {
@@ -139,7 +139,7 @@ def _costs(recipe: Recipe, n: int, samples: Sequence[Sample], cores: int) -> dic
 
 
 def _labels(recipe: Recipe, samples: Sequence[Sample]) -> dict[str, dict[str, int]]:
-    """Records of every grade, by the column of the grade; those without limits are left out."""
+    """Number of records of every grade, by grade column; severities without limits are left out."""
     columns = [w.grade_column for w in recipe.severities if w.grade_column and w.edges]
     rows = {name: [sample.row[name] for sample in samples] for name in columns}
     return {
@@ -156,7 +156,7 @@ def _shares(recipe: Recipe, samples: Sequence[Sample]) -> dict[str, float]:
 
 
 def _regions(recipe: Recipe, samples: Sequence[Sample]) -> dict[str, dict[str, Any]]:
-    """Bounds of every held-out region, and the share of the records that lie in it."""
+    """Bounds of every held-out region, and its share of the records."""
     return {
         region.name: {
             "bounds": {column: list(ends) for column, ends in region.bounds.items()},
@@ -171,7 +171,7 @@ def _within(row: Mapping[str, Any], bounds: Mapping[str, tuple[float, float]]) -
 
 
 def _draws(recipe: Recipe) -> list[tuple[str, Draw]]:
-    """Every draw of a recipe with its level."""
+    """All draws of a recipe with their levels."""
     table = recipe.table
     worn = [
         Draw(path=each.path, distribution="log-uniform", low=each.low, high=each.high)
@@ -182,7 +182,7 @@ def _draws(recipe: Recipe) -> list[tuple[str, Draw]]:
 
 
 def _summary(recipe: Recipe, level: str, draw: Draw) -> dict[str, Any]:
-    """One draw as the recipe says it, and the ends of every value it stands for [SI]."""
+    """One draw as in the recipe, and the ends of every value it matches [SI]."""
     paths = matches(recipe.base, draw.path)
     known = [axis for axis in (*recipe.machine, *recipe.record) if axis.path in paths]
     known += [w.axis for w in recipe.severities if w.axis.path in paths]
@@ -211,7 +211,7 @@ def preview_text(table: Mapping[str, Any]) -> str:
     Parameters
     ----------
     table : mapping
-        Of :class:`Preview`.
+        Table of :class:`Preview`.
     """
     machines = f"{table['records']} records of {table['machines']} machines"
     if table["machines_of"] != table["recipe"]:
@@ -224,7 +224,7 @@ def preview_text(table: Mapping[str, Any]) -> str:
         f"{table['sample_rate_hz']:g} Hz, {table['duration_s']:g} s each",
         f"  rungs ({_fidelity(table['fidelity'])}): "
         + ", ".join(f"{effect} {rung}" for effect, rung in table["rungs"].items()),
-        f"  estimate: {_time(seconds)} on {table['cores']} core(s), by tabulated cost; not in it: "
+        f"  estimate: {_time(seconds)} on {table['cores']} core(s), by tabulated cost, without "
         + _not_in_it(table["fidelity"]),
         f"  sampling {table['sampling']}; drawn here: {table['drawn_records']} records",
     ]
@@ -244,7 +244,7 @@ def preview_text(table: Mapping[str, Any]) -> str:
 
 
 def _not_in_it(fidelity: str) -> str:
-    """What takes time beside the records."""
+    """Additional time, not included in that of the records."""
     once = "compiling, a minute or two when a machine is simulated for the first time"
     return once if fidelity == "given" else f"{once}, and the pilots that choose the rungs"
 
@@ -280,7 +280,7 @@ def _draw_lines(draws: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def preview_figure(found: Preview) -> Any:
-    """Small panels of the draws: every value against the first severity, by its grade.
+    """Small panels of the draws: every value against the first severity, by grade.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def _colour(grade: int) -> str:
 
 
 def _titled(found: Preview, path: str) -> str:
-    """Path and SI unit; numbers without a unit have none."""
+    """Path and SI unit; a dash for numbers without a unit."""
     unit = si_unit(type(found.recipe.scene), path)
     return f"{short_name(path, 38)}\n[{unit or '-'}]"
 
@@ -392,4 +392,4 @@ def _draw_path(axes: Any, found: Preview, path: str) -> None:
     axes.set(xticks=[low, high], xticklabels=[f"{low:.3g}", f"{high:.3g}"])
     axes.set_title(_titled(found, path), fontsize=8, loc="right")
     axes.tick_params(labelsize=8)
-    axes.yaxis.set_major_formatter("{x:.6g}")  # a power of ten has no place beside the title
+    axes.yaxis.set_major_formatter("{x:.6g}")  # a power of ten would not fit next to the title

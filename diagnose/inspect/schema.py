@@ -1,4 +1,4 @@
-"""JSON schemas of scenes, for editors: keys, units, ranges."""
+"""JSON schemas of scenes for editors: keys, units, ranges."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -11,8 +11,8 @@ from ...sim.scene.scene import Scene
 def scene_schema(machine: type[Scene]) -> dict[str, Any]:
     """JSON schema of a machine's scenes, for editors of TOML.
 
-    Numbers with a dimension take a text with a unit as well. What holds between keys (one of two
-    clearances, a rung that needs a table) is left to ``scene check``.
+    Numbers with a dimension also accept a text with a unit. Relations between keys (one of two
+    clearances, a rung that needs a table) are left to ``scene check``.
 
     Parameters
     ----------
@@ -45,20 +45,20 @@ def scene_schema(machine: type[Scene]) -> dict[str, Any]:
 
 
 class _Generator(GenerateJsonSchema):
-    """A default that is a frozen table is left out, silently."""
+    """Silently omits a default that is a frozen table."""
 
     def emit_warning(self, kind: Any, detail: str) -> None:
-        """As of pydantic, without that one."""
+        """As in pydantic, except for that warning."""
         if kind != "non-serializable-default":
             super().emit_warning(kind, detail)
 
 
-_PARTIAL = "Partial"  # ends the names of tables in which nothing is required
+_PARTIAL = "Partial"  # ends the names of tables without required keys
 _SIGNS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 
 
 def _renamed(node: Any) -> Any:
-    """References to tables as references to their partial twins."""
+    """References to tables, changed to their partial twins."""
     if isinstance(node, Mapping):
         return {
             key: f"{value}{_PARTIAL}" if key == "$ref" else _renamed(value)
@@ -68,7 +68,7 @@ def _renamed(node: Any) -> Any:
 
 
 def _tidy(node: Any) -> Any:
-    """A schema without nulls, which TOML lacks, with bounds by their names and units in words."""
+    """A schema without nulls, which TOML lacks, with named bounds and units in descriptions."""
     if isinstance(node, list):
         return [_tidy(each) for each in node]
     if not isinstance(node, Mapping):

@@ -1,4 +1,4 @@
-"""What a user asks first of a simulated run, in a few lines, and the same in SI."""
+"""Main results of a simulated run, in a few lines, and the same in SI."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -14,19 +14,19 @@ from ..pages.si_text import si_text
 
 
 def simulation_summary(scene: Scene, solution: Recording) -> dict[str, Any]:
-    """Levels of the channels, and what the simulator alone knows.
+    """Levels of the channels, and results known only to the simulator.
 
     Parameters
     ----------
     scene : Scene
     solution : Recording
-        With its truth.
+        Recording with its truth.
 
     Returns
     -------
     dict
         ``channels``: rms and peak about the mean of each but the tacho, with mean and unit;
-        ``truth``: name -> value [SI], unit, meaning.
+        ``truth``: value [SI], unit and meaning by name.
     """
     return {
         "channels": {
@@ -58,7 +58,7 @@ def summary_lines(scene: Scene, summary: Mapping[str, Any]) -> list[str]:
     ----------
     scene : Scene
     summary : mapping
-        Of :func:`simulation_summary`.
+        Summary from :func:`simulation_summary`.
 
     Returns
     -------
@@ -68,8 +68,8 @@ def summary_lines(scene: Scene, summary: Mapping[str, Any]) -> list[str]:
         name: Truth(row["value"], row["unit"], row["meaning"])
         for name, row in summary["truth"].items()
     }
-    told = presentation_of(scene).lines(truth)
-    return [f"  {what:11}{text}" for what, text in (*told, *_channel_lines(summary["channels"]))]
+    lines = presentation_of(scene).lines(truth)
+    return [f"  {what:11}{text}" for what, text in (*lines, *_channel_lines(summary["channels"]))]
 
 
 def _channel_lines(channels: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""What commands share: options, arguments, outputs, progress, help.
+"""Shared by all commands: options, arguments, outputs, progress, help.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``datasets.workers``,
 ``datasets.source``, ``datasets.recipe``, ``datasets.measured``, ``diagnose.pages``,

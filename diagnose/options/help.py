@@ -1,4 +1,4 @@
-"""Help of the commands: first contact, examples, options in groups, and hints where one slipped."""
+"""Help of the commands: first contact, examples, options in groups, and hints on usage errors."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +22,7 @@ Simulate a machine:
   wearstate chart mine.toml -o chart.html                           which models it needs
 
 wearstate demo does it all in a minute; wearstate --help lists the commands, and
-wearstate COMMAND --help tells each with examples.
+wearstate COMMAND --help explains each with examples.
 """
 
 _SOURCE = "Measured file"
@@ -40,7 +40,7 @@ _GROUPS: dict[str, tuple[str, ...]] = {
     ),
     _RUN: ("seed", "jobs", "scheduler", "budget"),
 }
-"""Heading -> parameters below it; all others stand first, below "Options"."""
+"""Parameters below each heading; all others come first, below "Options"."""
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "scene list": ("wearstate scene list", "wearstate scene list --json"),
@@ -159,15 +159,15 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "wearstate completion fish > ~/.config/fish/completions/wearstate.fish",
     ),
 }
-"""Command -> lines of its examples."""
+"""Example lines by command."""
 
 
 class HelpfulCommand(click.Command):
-    """A command with examples, its options in groups, and a hint for an output named bare."""
+    """A command with examples, options in groups, and a hint if an output lacks its option."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """As of click; what is missing or too much is told how it is written."""
-        given = list(args)  # click takes them out one by one
+        """As in click; usage errors get a hint."""
+        given = list(args)  # click consumes them one by one
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:
@@ -178,13 +178,13 @@ class HelpfulCommand(click.Command):
             raise
 
     def _hint(self, ctx: click.Context, error: click.UsageError, args: list[str]) -> str:
-        """How an output is named that stands bare, and where a model comes from."""
+        """Hint on how to name an output that lacks its option, or where a model comes from."""
         if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
-            return ""  # its value is at fault, and it says so
+            return ""  # its value is wrong, and the error says so
         param = getattr(error, "param", None)
         missing = None if param is None else param.name
         if missing == "model_file":
-            return "train one of a labelled data set: wearstate train DATA -o model.wsm"
+            return "train one on a labelled data set: wearstate train DATA -o model.wsm"
         if missing not in (None, "output") or "output" not in {each.name for each in self.params}:
             return ""
         try:
@@ -213,18 +213,18 @@ class HelpfulCommand(click.Command):
             if row is not None:
                 groups[heading_of.get(param.name or "", "Options")].append(row)
         shown = {heading: rows for heading, rows in groups.items() if rows} or {"Options": []}
-        told = self.get_help_option(ctx)
-        if told is not None and (row := told.get_help_record(ctx)) is not None:
+        option = self.get_help_option(ctx)
+        if option is not None and (row := option.get_help_record(ctx)) is not None:
             shown[list(shown)[-1]].append(row)
         return shown
 
 
 def command(name: str | None = None) -> Callable[[Callable[..., Any]], HelpfulCommand]:
-    """Decorator that makes a function a command with helpful help."""
+    """Decorator that makes a function a command with this help."""
     return click.command(name, cls=HelpfulCommand)
 
 
 class HelpfulGroup(click.Group):
-    """A group of helpful commands."""
+    """A group of commands with this help."""
 
     command_class = HelpfulCommand

@@ -1,4 +1,4 @@
-"""Scenes, recipes, data sets and models as arguments: what is meant, what was taken for it.
+"""Scenes, recipes, data sets and models as arguments, with hints if one is mistaken for another.
 
 Heavy imports stay inside the functions, so that ``--help`` and completion answer at once.
 """
@@ -18,7 +18,7 @@ _BUILT_IN = {"scene": _ROOT / "sim/scene/built_in", "recipe": _ROOT / "datasets/
 
 
 def built_in(what: str) -> list[str]:
-    """Names of the built-in scenes or recipes, sorted; read from their folder alone.
+    """Names of the built-in scenes or recipes, sorted; read from their folder only.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def built_in(what: str) -> list[str]:
 
 
 class _Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.3 on
-    """A built-in name or a file; the names complete."""
+    """A built-in name or a file, with completion of the names."""
 
     def __init__(self, what: str) -> None:
         self.name = what
@@ -37,7 +37,7 @@ class _Name(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Built-in names that begin so, and files."""
+        """Built-in names with this beginning, and files."""
         del ctx, param
         names = [name for name in built_in(self.name) if name.startswith(incomplete)]
         return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
@@ -50,7 +50,7 @@ class SceneName(_Name):
         super().__init__("scene")
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As of :class:`click.ParamType`."""
+        """As in :class:`click.ParamType`."""
         if value in built_in("scene") or value not in built_in("recipe") or Path(value).is_file():
             return value
         from ...datasets.recipe.text import read_recipe
@@ -71,7 +71,7 @@ class RecipeName(_Name):
         super().__init__("recipe")
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As of :class:`click.ParamType`."""
+        """As in :class:`click.ParamType`."""
         if value in built_in("recipe") or value not in built_in("scene") or Path(value).is_file():
             return value
         from ...datasets.recipe.text import read_recipe
@@ -96,14 +96,14 @@ scene_argument = click.argument("scene_name", metavar="SCENE", type=SCENE)
 
 
 class _Kind(PathType):
-    """A path to files of one kind; those of another, and built-in names, are refused by name."""
+    """A path to files of one kind; other kinds, and built-in names, are refused by name."""
 
     def __init__(self, what: str, suffixes: tuple[str, ...], others: Mapping[str, str]) -> None:
         super().__init__(path_type=Path)
         self._what, self._suffixes, self._others = what, suffixes, others
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As of :class:`click.ParamType`."""
+        """As in :class:`click.ParamType`."""
         path = super().convert(value, param, ctx)
         other = self._others.get(path.suffix)
         if other is not None:
@@ -116,11 +116,11 @@ class _Kind(PathType):
 
 
 _MAKES = {"scene": "simulate", "recipe": "generate"}
-"""Built-in name -> command that makes a file of it."""
+"""Command that makes a file of a built-in scene or recipe."""
 
 
 def _order(param: Any, ctx: Any) -> str:
-    """How the arguments of a command stand, where two may have been swapped."""
+    """Order of the arguments of a command, if two may have been swapped."""
     arguments = [p for p in ctx.command.params if isinstance(p, click.Argument)] if ctx else []
     if isinstance(param, click.Option):
         return f"; {param.opts[0]} takes one, train it: wearstate train DATA -o model.wsm"

@@ -1,4 +1,4 @@
-"""Progress of commands, on stderr where a person watches."""
+"""Progress of commands on stderr, for interactive use."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """Progress bar on stderr where a person watches; nothing elsewhere."""
+    """Progress bar on stderr in a terminal; otherwise None."""
     if not sys.stderr.isatty():
         yield None
         return
@@ -29,9 +29,9 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
 
 @contextmanager
 def time_bar() -> Iterator[Callable[[str, float, float], None] | None]:
-    """Bar on stderr where a person watches: what is done now, and the seconds left.
+    """Bar on stderr in a terminal: current step, and the seconds left; otherwise None.
 
-    Gives a function of what is done, seconds gone by, and seconds that are left.
+    Yields a function of the current step, the seconds elapsed, and the seconds left.
     """
     if not sys.stderr.isatty():
         yield None

@@ -1,4 +1,4 @@
-"""What commands share: types and values of options, exit codes, output as text or JSON.
+"""Shared by commands: types and values of options, exit codes, output as text or JSON.
 
 Heavy imports stay inside the functions, so that ``--help`` answers at once.
 """
@@ -17,20 +17,20 @@ EXIT_FAILED, EXIT_BAD_INPUT, EXIT_WARNING, EXIT_ALARM, EXIT_UNFAMILIAR = 1, 2, 3
 
 
 class PathType(click.Path):
-    """A path that is not empty: an empty one is a shell variable gone wrong."""
+    """A non-empty path: an empty one comes from an unset shell variable."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As of :class:`click.ParamType`."""
+        """As in :class:`click.ParamType`."""
         if str(value).strip() == "":
             self.fail("is empty, must be a path; name one", param, ctx)
         return super().convert(value, param, ctx)
 
 
 class Share(click.FloatRange):
-    """A number in a range; not-a-number is in none."""
+    """A number in a range, which excludes not-a-number."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As of :class:`click.ParamType`."""
+        """As in :class:`click.ParamType`."""
         number = super().convert(value, param, ctx)
         if math.isnan(number):
             self.fail(f"{value} must be >= {self.min:g} and <= {self.max:g}; try 0.25", param, ctx)
@@ -38,12 +38,12 @@ class Share(click.FloatRange):
 
 
 class Accuracy(Share):
-    """A share, of every quantity of a scene; or ``verdict=2%``, of the error of a wear estimate."""
+    """A share for all quantities of a scene, or ``verdict=2%`` for the error of a wear estimate."""
 
     name = "accuracy"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """As of :class:`click.ParamType`: (of the verdict, share)."""
+        """As in :class:`click.ParamType`: (whether for the verdict, share)."""
         if isinstance(value, tuple):
             return value
         text = str(value).strip()
@@ -113,23 +113,23 @@ def emit(value: dict[str, Any], as_json: bool, text: str) -> None:
 
 
 def worker_count(jobs: int | None) -> int:
-    """Worker processes asked for, or as many as there are cores."""
+    """Number of worker processes requested, or else of cores."""
     from ...datasets.workers.local import cores
 
     return jobs or cores()
 
 
 def scene_of(name: str, pairs: Sequence[str]) -> Any:
-    """The scene of a command with the values of ``--set``; tells the unit of bare numbers."""
+    """The scene of a command with the values of ``--set``; reports the units of bare numbers."""
     from ...sim.scene.load import load_scene
 
     values = overrides_of(pairs)
-    tell_bare(name, values)
+    report_bare_units(name, values)
     return load_scene(name, values)
 
 
-def tell_bare(name: str, values: Mapping[str, Any]) -> None:
-    """Tell on stderr as what numbers without a unit are taken."""
+def report_bare_units(name: str, values: Mapping[str, Any]) -> None:
+    """Report on stderr the units assumed for numbers without a unit."""
     from ...sim.parts.wording import si_unit
     from ...sim.scene.load import MACHINES, numbered, scene_table, scene_text
     from ...sim.scene.scene import Scene
@@ -146,7 +146,7 @@ def tell_bare(name: str, values: Mapping[str, Any]) -> None:
 
 
 def _bare_text(value: float, unit: str) -> str:
-    """A number of SI with its unit, and as people say it.
+    """An SI number with its unit, and in the usual unit.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def _bare_text(value: float, unit: str) -> str:
 
 
 def overrides_of(pairs: Sequence[str]) -> dict[str, Any]:
-    """``path=value`` pairs; a value that reads as a number is one."""
+    """Values by path from ``path=value`` texts; one that reads as a number is converted."""
     values: dict[str, Any] = {}
     for pair in pairs:
         path, sign, text = pair.partition("=")
@@ -175,7 +175,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def _number_or_text(text: str) -> Any:
-    """Python would also read ``1_0`` and ``nan`` as numbers; a person has mistyped them."""
+    """Python would also accept ``1_0`` and ``nan``, which are typing errors here."""
     if not NUMBER.fullmatch(text):
         return text
     whole = re.fullmatch("[-+]?[0-9]{1,18}", text)
@@ -183,7 +183,7 @@ def _number_or_text(text: str) -> Any:
 
 
 def as_options(text: str, command: click.Command | None) -> str:
-    """The library speaks of arguments, here they are options: ``fs = 0`` is ``--fs = 0``."""
+    """Library messages name arguments; here they become options: ``fs = 0`` is ``--fs = 0``."""
     for param in command.params if command else ():
         option = next((name for name in param.opts if name.startswith("--")), "")
         word = option.removeprefix("--").replace("-", "_")
@@ -193,7 +193,7 @@ def as_options(text: str, command: click.Command | None) -> str:
 
 
 _OTHER_NAMES = {"--speed-band": ("band_hz",)}
-"""What functions below the command call the value of an option."""
+"""Names in functions below the command for the value of an option."""
 
 
 def _with_option(text: str, word: str, option: str) -> str:

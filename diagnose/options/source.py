@@ -1,4 +1,4 @@
-"""Options that say what a measured file holds: channels, rates, speed, bearing, window."""
+"""Options that declare a measured file: channels, rates, speed, bearing, window."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
@@ -11,7 +11,7 @@ from .shared import NUMBER, PATH, Share
 
 
 def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Options about a measured file, the same for every command that reads one."""
+    """Options for a measured file, the same for every command that reads one."""
 
     @wraps(command)
     def with_profile(*args: Any, like: Path | None = None, **given: Any) -> Any:
@@ -24,19 +24,19 @@ def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _filled(like: Path | None, given: dict[str, Any]) -> dict[str, Any]:
-    """Options about a file with what a profile says; what the caller says stands."""
+    """Options for a file, with those of a profile added; the caller's take precedence."""
     if like is None:
         return {**given, "like": None}
     from ..wear_model.like import read_profile
 
     profile, tacho, pulses = read_profile(like)
-    told = dict(given)
-    if told["tacho"] is None:
-        told["tacho"] = tacho
+    filled = dict(given)
+    if filled["tacho"] is None:
+        filled["tacho"] = tacho
     asked = click.get_current_context().get_parameter_source("pulses_per_revolution")
-    if asked is click.core.ParameterSource.DEFAULT and told["tacho"] is not None:
-        told["pulses_per_revolution"] = pulses
-    return {**told, "like": profile}
+    if asked is click.core.ParameterSource.DEFAULT and filled["tacho"] is not None:
+        filled["pulses_per_revolution"] = pulses
+    return {**filled, "like": profile}
 
 
 _SOURCE_OPTIONS = (
@@ -46,12 +46,12 @@ _SOURCE_OPTIONS = (
         metavar="MODEL|JSON",
         help="Take channels, units, rate and tacho from a model or the output of `info --json`.",
     ),
-    click.option("--fs", type=float, help="Sample rate [Hz], where the file has none."),
+    click.option("--fs", type=float, help="Sample rate [Hz], if the file has none."),
     click.option(
         "--unit",
         multiple=True,
         metavar="[CHANNEL=]UNIT",
-        help="Unit of a channel, or of all others, where the file declares none.",
+        help="Unit of a channel, or of all others, if the file declares none.",
     ),
     click.option(
         "--sensitivity",
@@ -69,13 +69,13 @@ _SOURCE_OPTIONS = (
         "--channels",
         multiple=True,
         metavar="NAME,…",
-        help="Channels to read, in order; NEW=OLD renames one. Where the file has no names: the "
+        help="Channels to read, in order; NEW=OLD renames one. If the file has no names: the "
         "names of all.",
     ),
     click.option(
         "--variable",
         multiple=True,
-        help="Array, data set or group to read, where the file holds several; repeatable: several "
+        help="Array, data set or group to read, if the file holds several; repeatable: several "
         "of one length become channels.",
     ),
     click.option("--tacho", help="Name of the tacho channel."),
@@ -90,7 +90,7 @@ _SOURCE_OPTIONS = (
         "--record",
         type=click.IntRange(0),
         default=0,
-        help="Record to read, counted from 0, where there are several.",
+        help="Record to read, counted from 0, if there are several.",
     ),
     click.option(
         "--rows",
@@ -98,12 +98,12 @@ _SOURCE_OPTIONS = (
         help="Read each row of an array or a text file as a record of one channel.",
     ),
     click.option("--delimiter", help="Delimiter of a text file: ',', ';', tab or space."),
-    click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark of a text file."),
     click.option(
         "--header", type=click.IntRange(0), help="Number of lines above the numbers of a text file."
     ),
     click.option(
-        "--time-column", help="Name or number (from 1) of the column of times; 0: there is none."
+        "--time-column", help="Name or number (from 1) of the time column; 0: there is none."
     ),
     click.option("--dtype", help="Number type of headerless binary, e.g. '<int16', '>float32'."),
     click.option(
@@ -120,7 +120,7 @@ _SOURCE_OPTIONS = (
     click.option(
         "--partial",
         is_flag=True,
-        help="Read what is there of a WAV, TDMS or binary file that was cut short.",
+        help="Read the existing samples of a WAV, TDMS or binary file that was cut short.",
     ),
     click.option(
         "--resample-to", type=float, metavar="HZ", help="Resample measured files to this rate."
@@ -129,7 +129,7 @@ _SOURCE_OPTIONS = (
 
 
 def declared_source(given: Mapping[str, Any]) -> Any:
-    """Options about a measured file, as the library takes them."""
+    """Options for a measured file, in the form of the library."""
     from ...datasets.source.part import SourceOptions
 
     column = given["time_column"]
@@ -160,7 +160,7 @@ def _each_channel(texts: Sequence[str], option: str) -> Any:
         name, sign, value = text.rpartition("=")
         if not value.strip() or (sign and not name) or name in named:
             raise click.BadParameter(
-                f"'{text}' must read [CHANNEL=]VALUE, once for a channel", param_hint=option
+                f"'{text}' must read [CHANNEL=]VALUE, once per channel", param_hint=option
             )
         if sign:
             named[name] = value
@@ -174,21 +174,21 @@ def _each_channel(texts: Sequence[str], option: str) -> Any:
     return EachChannel(named, others=others[0] if others else None) if texts else None
 
 
-def told_of_channels(texts: Sequence[str], option: str) -> dict[str, str]:
-    """``channel=text``, once for a channel."""
-    told: dict[str, str] = {}
+def texts_by_channel(texts: Sequence[str], option: str) -> dict[str, str]:
+    """Texts by channel from ``channel=text``, once per channel."""
+    texts_of: dict[str, str] = {}
     for text in texts:
         name, _, value = text.partition("=")
-        if not name.strip() or not value.strip() or name in told:
+        if not name.strip() or not value.strip() or name in texts_of:
             raise click.BadParameter(
-                f"'{text}' must read CHANNEL=TEXT, once for a channel", param_hint=option
+                f"'{text}' must read CHANNEL=TEXT, once per channel", param_hint=option
             )
-        told[name] = value
-    return told
+        texts_of[name] = value
+    return texts_of
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]
-    """Numbers parted by commas."""
+    """Numbers separated by commas."""
 
     name = "numbers"
 
@@ -199,13 +199,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
         try:
             return tuple(float(part) for part in value.split(","))
         except ValueError:
-            self.fail(f"{value!r} must be numbers parted by commas", param, ctx)
+            self.fail(f"{value!r} must be numbers separated by commas", param, ctx)
 
 
 speed_option = click.option(
     "--speed-hz",
     type=float,
-    help="Shaft speed [Hz] where there is no tacho; default: the one stored in the file.",
+    help="Shaft speed [Hz] if there is no tacho; default: the one stored in the file.",
 )
 
 

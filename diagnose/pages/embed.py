@@ -1,4 +1,4 @@
-"""Bokeh in a page that needs no network: its script and figures go into the HTML.
+"""Bokeh in a page that works offline: its script and figures are embedded in the HTML.
 
 Bokeh is optional; its script comes from the installed package.
 """
@@ -10,19 +10,19 @@ from typing import Any
 from ...sim.output.recording import DataError
 
 MOST_BYTES = 2_500_000
-"""Of a page with figures to zoom in."""
+"""Largest size of a page with zoomable figures."""
 
 SPARE_BYTES = 100_000
-"""Kept for the words of such a page."""
+"""Part reserved for the text of such a page."""
 
 
 def require_bokeh() -> None:
-    """Refuse where the library that draws is missing.
+    """Refuse if the plotting library is missing.
 
     Raises
     ------
     DataError
-        It names the cure.
+        If Bokeh is not installed; the message contains the cure.
     """
     if find_spec("bokeh") is None:
         raise DataError(
@@ -32,14 +32,14 @@ def require_bokeh() -> None:
 
 
 def bokeh_script() -> str:
-    """The script of the library, as HTML."""
+    """The script of the library as HTML."""
     from bokeh.resources import Resources
 
     return str(Resources(mode="inline", components=["bokeh"]).render_js())
 
 
 def item_text(figure: Any) -> str:
-    """A figure as JSON that may stand in a script element of a page.
+    """A figure as JSON that can be placed in a script element of a page.
 
     Parameters
     ----------

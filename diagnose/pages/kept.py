@@ -1,4 +1,4 @@
-"""What a long command has finished, kept beside its output, so that the same command goes on."""
+"""Finished pieces of a long command, stored with its output so that it can be resumed."""
 
 import json
 import math
@@ -13,11 +13,11 @@ from ...sim.output.recording import DataError
 Piece = TypeVar("Piece")
 
 ENDING = ".part.json"
-"""Takes the place of the output's suffix in the name of the file."""
+"""Ending that replaces the suffix of the output in the name of the file."""
 
 
 def part_file(output: Path | None) -> Path | None:
-    """File beside an output that keeps what is finished; None without an output.
+    """File next to an output that stores finished pieces; None without an output.
 
     Examples
     --------
@@ -33,20 +33,20 @@ class Kept(MutableMapping[str, Piece], Generic[Piece]):
     Parameters
     ----------
     path : Path or None
-        None keeps nothing beyond this object.
+        File; None to keep the pieces in this object only.
     key : str
-        Hash of all that the pieces depend on.
+        Hash of all inputs of the pieces.
     table_of, piece_of : callable
-        A piece as plain values, and back.
+        Conversions of a piece to plain values and back.
     depends : str
-        What the key is of, for a message: "another model, recipe or version".
+        Inputs behind the key, for a message: "another model, recipe or version".
     pause : float
-        Seconds between two times that the file is written; :meth:`save` writes the rest.
+        Shortest time between two writes of the file [s]; :meth:`save` writes the rest.
 
     Raises
     ------
     DataError
-        The file is damaged, or of another key.
+        If the file is damaged, or has another key.
     """
 
     def __init__(
@@ -81,18 +81,18 @@ class Kept(MutableMapping[str, Piece], Generic[Piece]):
             raise DataError(f"{path} is of {depends}; delete it, or use --force")
 
     def __getitem__(self, name: str) -> Piece:
-        """Piece of a name."""
+        """Piece of that name."""
         return self._pieces[name]
 
     def __setitem__(self, name: str, piece: Piece) -> None:
-        """Keep one more, in the file as well where its time has come."""
+        """Add a piece, and write the file if it is due."""
         self._pieces[name] = piece
         self._saved = False
         if time.monotonic() - self._written >= self.pause:
             self.save()
 
     def __delitem__(self, name: str) -> None:
-        """Forget a piece."""
+        """Remove a piece."""
         del self._pieces[name]
         self._saved = False
 
@@ -101,11 +101,11 @@ class Kept(MutableMapping[str, Piece], Generic[Piece]):
         return iter(self._pieces)
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Number of pieces."""
         return len(self._pieces)
 
     def save(self) -> None:
-        """Write what is not in the file yet."""
+        """Write all pieces not yet in the file."""
         if self.path is None or self._saved:
             return
         pieces = {name: self._table_of(piece) for name, piece in self._pieces.items()}
@@ -113,6 +113,6 @@ class Kept(MutableMapping[str, Piece], Generic[Piece]):
         self._saved, self._written = True, time.monotonic()
 
     def drop(self) -> None:
-        """Delete the file: all is done."""
+        """Delete the file after all is done."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Pages of HTML: rendered from the templates, words from data made visible and escaped."""
+"""HTML pages: rendered from the templates, with text from data made visible and escaped."""
 
 import unicodedata
 from pathlib import Path
@@ -8,11 +8,11 @@ from ...sim.atomic import write_whole
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}  # control, format, lone surrogate, separators
-_STRANGE = "\N{REPLACEMENT CHARACTER}"
+_REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 
 def visible(text: str) -> str:
-    r"""A text whose every character shows: what is not printed, or turns the line, is replaced.
+    r"""A text in which every character is visible: control and bidirectional ones are replaced.
 
     Tabs and line feeds stay.
 
@@ -24,13 +24,13 @@ def visible(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(
-        _STRANGE if unicodedata.category(letter) in _UNSEEN and letter not in "\t\n" else letter
+        _REPLACEMENT if unicodedata.category(letter) in _UNSEEN and letter not in "\t\n" else letter
         for letter in text
     )
 
 
 def short_name(name: str, most: int = 40) -> str:
-    r"""A name on one line, its middle left out where it is long, for a legend or an axis.
+    r"""A name on one line, shortened in the middle if it is long, for a legend or an axis.
 
     Examples
     --------
@@ -46,19 +46,19 @@ def short_name(name: str, most: int = 40) -> str:
 
 
 def render(template: str, **context: Any) -> str:
-    """A template filled in.
+    """A rendered template.
 
     Parameters
     ----------
     template : str
-        File name in the folder of templates.
+        File name in the template folder.
     **context
-        What it names; text is escaped and made :func:`visible`.
+        Its variables; text is escaped and made :func:`visible`.
 
     Returns
     -------
     str
-        HTML, or a part of it.
+        HTML page, or a part of one.
     """
     import jinja2
 
@@ -74,11 +74,11 @@ def render(template: str, **context: Any) -> str:
 
 
 def _shown(value: Any) -> Any:
-    """Texts visible; what is HTML already stays, and so do numbers."""
+    """Texts made visible; HTML and numbers unchanged."""
     return visible(value) if type(value) is str else value
 
 
 def save_page(html: str, path: Path, *, force: bool = True) -> None:
-    """Write a page whole, or not at all; without `force`, only where nothing is."""
-    # a file's name may hold bytes that are no UTF-8
+    """Write a page completely or not at all; without `force`, never over an existing file."""
+    # a file's name may hold bytes that are not UTF-8
     write_whole(path, html.encode(errors="backslashreplace"), force=force)

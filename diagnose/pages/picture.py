@@ -1,4 +1,4 @@
-"""Figures as files and in pages: the same bytes every time, words from data as they stand."""
+"""Figures as files and in pages: reproducible bytes, text from data taken literally."""
 
 import base64
 import io
@@ -17,38 +17,38 @@ FORMATS = (".png", ".svg", ".pdf")
 """Suffixes of a picture."""
 
 DOTS_PER_INCH = 110
-"""Of a picture in points."""
+"""Resolution of a bitmap picture."""
 
 PAGE_WIDTH = 4.9
-"""Of a picture that a phone shows whole, text of 8 points and more [inch]."""
+"""Width of a picture that fits on a phone with text of 8 points or more [inch]."""
 
 PAGE_HEIGHT = 3.6
-"""And its height, where nothing asks for another [inch]."""
+"""Default height of such a picture [inch]."""
 
 PHONE_PX = 358
-"""Of the 390 pixels of a phone, less the margins of a page."""
+"""Usable width: the 390 pixels of a phone less the margins of a page."""
 
 LEAST_TEXT_PX = 8
 """Height of the smallest text that can be read."""
 
-_ENLARGED = 1.2  # a picture in a wide page, over its own size
-_EXPONENT = 0.7  # height of a raised letter, over the others
+_ENLARGED = 1.2  # factor on the size of a picture in a wide page
+_EXPONENT = 0.7  # height of a superscript, relative to other letters
 
 
 @dataclass(frozen=True, kw_only=True)
 class PageImage:
-    """A picture in a page, with the widths at which it can be read.
+    """A picture in a page, with the range of widths at which it is readable.
 
     Attributes
     ----------
     address : str
         PNG as a data address.
     svg : str
-        Instead of it, where points tell their names under the pointer.
+        Used instead of the PNG if points show their names under the pointer.
     least : int
-        Narrower, its smallest text is below :data:`LEAST_TEXT_PX` [CSS px].
+        Width below which its smallest text is less than :data:`LEAST_TEXT_PX` high [CSS px].
     most : int
-        Wider, it is only coarse [CSS px].
+        Width above which it is unnecessarily coarse [CSS px].
     """
 
     address: str = ""
@@ -58,17 +58,17 @@ class PageImage:
 
     @property
     def sideways(self) -> bool:
-        """Whether a phone cannot show it whole."""
+        """Whether it is too wide for a phone."""
         return self.least > PHONE_PX
 
 
 def picture_bytes(figure: Any, suffix: str) -> bytes:
-    """A figure as a file, the same bytes every time.
+    """A figure as a file with reproducible bytes.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        Its words are taken literally from here on: a dollar sign begins no formula.
+        Its text is taken literally from now on: a dollar sign starts no formula.
     suffix : str
         One of :data:`FORMATS`.
 
@@ -88,19 +88,19 @@ def picture_bytes(figure: Any, suffix: str) -> bytes:
 
 
 def lay_out(figure: Any) -> None:
-    """Place the axes of a figure, as drawing it would; without drawing.
+    """Place the axes of a figure as drawing would, without drawing.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        With a layout.
+        Figure with a layout engine.
     """
     figure.get_layout_engine().execute(figure)
 
 
 @contextmanager
 def _laid_out(figure: Any, form: str) -> Iterator[None]:
-    """Lay a figure out as saving would, which draws the whole of it once more for that."""
+    """Apply the layout of a figure once; saving would draw everything again for it."""
     from matplotlib.backend_bases import get_registered_canvas_class
 
     engine, canvas, dots = figure.get_layout_engine(), figure.canvas, figure.dpi
@@ -108,7 +108,7 @@ def _laid_out(figure: Any, form: str) -> Iterator[None]:
         yield
         return
     try:
-        get_registered_canvas_class(form)(figure)  # whose letters are measured
+        get_registered_canvas_class(form)(figure)  # used to measure text
         figure.dpi = DOTS_PER_INCH
         lay_out(figure)
         figure.dpi = dots
@@ -121,7 +121,7 @@ def _laid_out(figure: Any, form: str) -> Iterator[None]:
 
 
 def save_picture(figure: Any, path: Path, *, force: bool = True) -> None:
-    """Write a figure whole or not at all.
+    """Write a figure completely or not at all.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def save_picture(figure: Any, path: Path, *, force: bool = True) -> None:
     Raises
     ------
     DataError
-        Another suffix.
+        If the suffix is another.
     """
     if path.suffix not in FORMATS:
         raise DataError(f"{path}: suffix must be one of {', '.join(FORMATS)}; rename it")
@@ -148,7 +148,7 @@ def page_image(figure: Any, *, colours: int | None = None) -> PageImage:
     ----------
     figure : matplotlib.figure.Figure
     colours : int, optional
-        With few, a third of the size.
+        Number of colours; a small number reduces the size to a third.
 
     Returns
     -------
@@ -165,14 +165,14 @@ def page_image(figure: Any, *, colours: int | None = None) -> PageImage:
 
 
 def drawn_alone(draw: Callable[[Any], None], *, height: float = PAGE_HEIGHT) -> PageImage:
-    """One pair of axes as a picture of a page.
+    """One pair of axes as a picture for a page.
 
     Parameters
     ----------
     draw : callable
-        ``draw(axes)``
+        ``draw(axes)`` draws into the axes.
     height : float
-        [inch]
+        Height [inch].
 
     Returns
     -------
@@ -186,7 +186,7 @@ def drawn_alone(draw: Callable[[Any], None], *, height: float = PAGE_HEIGHT) -> 
 
 
 def least_width(figure: Any) -> int:
-    """Width below which the smallest text of a figure that was drawn cannot be read [CSS px]."""
+    """Width below which the smallest text of a drawn figure cannot be read [CSS px]."""
     from matplotlib.text import Text
 
     sizes = [_height(text) for text in figure.findobj(Text) if text.get_visible()]
@@ -196,7 +196,7 @@ def least_width(figure: Any) -> int:
 
 
 def _height(text: Any) -> float:
-    """Of the smallest letter [pt]; 0 without letters."""
+    """Height of the smallest letter [pt]; 0 without letters."""
     words = text.get_text()
     if not words.strip():
         return 0.0
@@ -205,14 +205,14 @@ def _height(text: Any) -> float:
 
 
 def plain_numbers(axis: Any) -> None:
-    """On a logarithmic axis 0.01 rather than a power of ten, whose exponent nobody can read."""
+    """Label a logarithmic axis with 0.01 instead of powers of ten, whose exponents are tiny."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
     if axis.get_scale() != "log":
         return
     low, high = axis.get_view_interval()
     if high < _FEW * low:
-        axis.set_major_locator(MaxNLocator(4))  # the other would take up to nine, which touch
+        axis.set_major_locator(MaxNLocator(4))  # the default allows up to nine, which touch
     else:
         narrow = high < _NARROW * low
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
@@ -220,12 +220,12 @@ def plain_numbers(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-_FEW = 5.0  # of an axis, last over first: up to here 1, 2, 5 may be a single number
-_NARROW = 200.0  # of an axis, last over first: so few decades need numbers between
+_FEW = 5.0  # ratio of the ends of an axis up to which only one of 1, 2, 5 may be labelled
+_NARROW = 200.0  # ratio of the ends of an axis below which numbers between decades are needed
 
 
 def _of_few_colours(picture: bytes, colours: int) -> bytes:
-    from PIL import Image  # comes with matplotlib
+    from PIL import Image  # installed with matplotlib
 
     small = io.BytesIO()
     whole = Image.open(io.BytesIO(picture)).convert("RGB")
@@ -234,9 +234,9 @@ def _of_few_colours(picture: bytes, colours: int) -> bytes:
 
 
 def _take_literally(figure: Any) -> None:
-    """No word of a figure is read as a formula; only matplotlib's own numbers on axes may be one.
+    """Prevent text of a figure from being parsed as formulas, except matplotlib's own axis numbers.
 
-    What the font lacks or nobody can see becomes a replacement sign.
+    Characters that are missing in the font or invisible become a replacement character.
     """
     for text in _words(figure):
         text.set_parse_math(False)
@@ -244,7 +244,7 @@ def _take_literally(figure: Any) -> None:
 
 
 def _words(artist: Any) -> Iterator[Any]:
-    """Texts of an artist; of an axis with numbers not those, each of which would be made for it."""
+    """Texts of an artist, without the tick numbers of an axis, which would first be created."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
 
@@ -260,14 +260,14 @@ def _words(artist: Any) -> Iterator[Any]:
 
 
 def _is_named(axis: Any) -> bool:
-    """Whether the ticks of an axis bear words."""
+    """Whether the tick labels of an axis are words."""
     from matplotlib.ticker import FixedFormatter, FuncFormatter
 
     return isinstance(axis.get_major_formatter(), FixedFormatter | FuncFormatter)
 
 
 def _name_literally(axis: Any) -> None:
-    """Words beside ticks are asked for anew with every drawing: cure them where they come from."""
+    """Replace tick words at their source, since every drawing requests them again."""
     from matplotlib.ticker import FuncFormatter
 
     words, label = axis.get_major_formatter(), axis.label
@@ -275,7 +275,7 @@ def _name_literally(axis: Any) -> None:
 
 
 def _drawable(words: str, text: Any) -> str:
-    """Words with a replacement sign for each character that the text's font does not have."""
+    """Text with a replacement character for every character that its font lacks."""
     from matplotlib.font_manager import findfont, get_font
 
     shown = visible(words).replace("\t", " ")

@@ -1,4 +1,4 @@
-"""Strict JSON of results: numpy's types as Python's own, what is not finite as null."""
+"""Strict JSON of results: numpy types as Python types, non-finite numbers as null."""
 
 import json
 import math
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def json_text(value: Mapping[str, Any], *, indent: int | None = None) -> str:
-    """Strict JSON: what is not finite is null, what has no JSON form is a defect.
+    """Strict JSON: non-finite numbers become null; a value without JSON form is a defect.
 
     Examples
     --------
@@ -18,11 +18,11 @@ def json_text(value: Mapping[str, Any], *, indent: int | None = None) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Python's own types, from numpy's and from tuples; null for a number that is not finite."""
+    """Python types from numpy types and tuples; null for a number that is not finite."""
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(inner) for inner in value]
-    if hasattr(value, "tolist"):  # of numpy
+    if hasattr(value, "tolist"):  # numpy
         return _plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,7 +1,7 @@
-"""Points on axes that tell their figures under the pointer, and their settings when tapped.
+"""Points on axes that show their values under the pointer, and their settings when tapped.
 
-A page of a chart, a sweep or a trend gives its points here and gets the part of HTML that shows
-them; what stands for them on paper is its own picture.
+A page of a chart, a sweep or a trend passes its points to this module and gets the HTML that shows
+them; for printing, the page uses its own picture.
 """
 
 import math
@@ -17,7 +17,7 @@ _HEIGHT = 430  # [px]
 _DATE_SPAN = 14 * 86_400_000  # [ms]
 _PICKED = "#b02a1c"
 _PLAIN_TICKS = "return String(parseFloat(tick.toPrecision(4)))"
-_TOLD = '<div style="white-space: pre-line; max-width: 19rem">@told</div>'
+_HOVER = '<div style="white-space: pre-line; max-width: 19rem">@hover</div>'
 
 _PICK = """
 const at = cb_obj.indices[0]  // the nearest of those that were hit
@@ -37,37 +37,37 @@ class Mark:
     Parameters
     ----------
     x, y : float
-        Where it stands; of a time axis milliseconds since 1970.
+        Coordinates; on a time axis milliseconds since 1970.
     low, high : float
-        Ends of its error bar; NaN without one.
-    told : str
-        Lines under the pointer.
+        Ends of the error bar; NaN without one.
+    hover : str
+        Lines shown under the pointer.
     block : str
-        Text that a tap shows, to be copied.
+        Text shown after a tap, to be copied.
     """
 
     x: float
     y: float
     low: float = math.nan
     high: float = math.nan
-    told: str
+    hover: str
     block: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Series:
-    """Points that look alike.
+    """Points of the same appearance.
 
     Parameters
     ----------
     name : str
-        In the legend; empty for none.
+        Name in the legend; empty for none.
     marks : tuple of Mark
     colour : str
     marker : str
-        Of Bokeh.
+        Bokeh marker.
     size : float
-        [px]
+        Size [px].
     filled : bool
     """
 
@@ -86,13 +86,13 @@ class DrawnLine:
     Parameters
     ----------
     name : str
-        In the legend.
+        Name in the legend.
     x, y : tuple of float
     colour : str
     steps : bool
-        Level from each point to the next.
+        Whether the line is level from each point to the next.
     dash : str
-        Of Bokeh.
+        Bokeh dash pattern.
     """
 
     name: str
@@ -110,21 +110,21 @@ class PointAxes:
     Parameters
     ----------
     title, x_name, y_name : str
-        Head and axes, with units.
+        Title and axis names, with units.
     series : tuple of Series
     lines : tuple of DrawnLine
     level : tuple of (str, float)
         Name and height of a limit; empty without one.
     band : tuple of (x, low, high)
-        Round a line; empty without one.
+        Band around a line; empty without one.
     band_name : str
-        Of the band, in the legend.
+        Name of the band in the legend.
     moments : tuple of float
-        Upright lines, as x.
+        Positions of vertical lines, as x.
     moments_name : str
-        Of these, in the legend.
+        Name of these lines in the legend.
     x_kind, y_kind : str
-        ``linear`` or ``log``; of x also ``datetime``.
+        ``linear`` or ``log``; for x also ``datetime``.
     """
 
     title: str
@@ -148,11 +148,11 @@ class PointBlock:
     Parameters
     ----------
     script : str
-        Of the library, as HTML.
+        Script of the library as HTML.
     item : str
-        PointAxes and tools as JSON that may stand in HTML.
+        PointAxes and tools as JSON that can be placed in HTML.
     left_out : tuple of str
-        Titles of axes that had no room.
+        Titles of axes left out for lack of room.
     """
 
     script: str
@@ -161,14 +161,14 @@ class PointBlock:
 
 
 def point_block(panels: Sequence[PointAxes], *, taken: int = 0) -> PointBlock:
-    """Points as a part of a page; the last axes are left out where a page would grow too large.
+    """Points as a part of a page; the last axes are left out if the page would become too large.
 
     Parameters
     ----------
     panels : sequence of PointAxes
-        The most important first.
+        Axes, the most important first.
     taken : int
-        Bytes of the rest of the page.
+        Size of the rest of the page [byte].
 
     Returns
     -------
@@ -177,7 +177,7 @@ def point_block(panels: Sequence[PointAxes], *, taken: int = 0) -> PointBlock:
     Raises
     ------
     DataError
-        Bokeh is not installed, or the first axes alone are too many points for a page.
+        If Bokeh is not installed, or the first axes alone have too many points for a page.
     """
     require_bokeh()
     script = bokeh_script()
@@ -195,7 +195,7 @@ def point_block(panels: Sequence[PointAxes], *, taken: int = 0) -> PointBlock:
 
 
 def _column(panels: Sequence[PointAxes]) -> Any:
-    """Axes one below the other, one point picked among all."""
+    """Axes one below the other, with one selected point among all."""
     from bokeh.layouts import column
     from bokeh.models import CustomJS
 
@@ -204,11 +204,11 @@ def _column(panels: Sequence[PointAxes]) -> Any:
         plot = _axes(panel)
         _draw_lines(plot, panel)
         sources += list(_draw_series(plot, panel.series))
-        _tell_limits(plot, panel)
+        _label_limits(plot, panel)
         figures.append(plot)
     for source in sources:
-        told = CustomJS(args={"source": source, "others": sources}, code=_PICK)
-        source.selected.js_on_change("indices", told)
+        pick = CustomJS(args={"source": source, "others": sources}, code=_PICK)
+        source.selected.js_on_change("indices", pick)
     return column(*figures, sizing_mode="stretch_width")
 
 
@@ -227,7 +227,7 @@ def _axes(panel: PointAxes) -> Any:
 
     wheel, zoom = WheelZoomTool(modifiers="ctrl"), BoxZoomTool()
     plot = figure(
-        # plain: a name between dollar signs is no formula, which would need the network
+        # plain: a name between dollar signs is not a formula, which would need the network
         title=Title(text=PlainText(text=visible(panel.title))),
         x_axis_label=PlainText(text=visible(panel.x_name)),
         y_axis_label=PlainText(text=visible(panel.y_name)),
@@ -237,16 +237,16 @@ def _axes(panel: PointAxes) -> Any:
         sizing_mode="stretch_width",
         toolbar_location="above",
         min_border_right=18,  # half of the last number
-        toolbar_sticky=False,  # in a row of its own: beside a long title a phone shows no tool
+        toolbar_sticky=False,  # in a separate row: next to a long title a phone would show no tools
         tools=[zoom, wheel, PanTool(), ResetTool(), TapTool()],
         active_drag=zoom,
         active_scroll=wheel,
     )
-    plot.add_tools(HoverTool(mode="mouse", tooltips=_TOLD, renderers=[]))
+    plot.add_tools(HoverTool(mode="mouse", tooltips=_HOVER, renderers=[]))
     plot.toolbar.logo = None
     if panel.x_kind == "datetime":
         across: Any = plot.x_range
-        across.default_span = _DATE_SPAN  # round a single date; Bokeh's own is 2 ms
+        across.default_span = _DATE_SPAN  # around a single date; Bokeh's own is 2 ms
     return plot
 
 
@@ -270,14 +270,14 @@ def _draw_lines(plot: Any, panel: PointAxes) -> None:
 
 
 def _draw_series(plot: Any, series: Sequence[Series]) -> Iterator[Any]:
-    """Draw points with error bars; gives the source of each series."""
+    """Draw points with error bars; yield the data source of each series."""
     from bokeh.models import ColumnDataSource, HoverTool
 
     hover = plot.select_one(HoverTool)
     for each in series:
         columns = ("x", "y", "low", "high")
         data: dict[str, Any] = {n: [getattr(m, n) for m in each.marks] for n in columns}
-        data |= {n: [visible(getattr(m, n)) for m in each.marks] for n in ("told", "block")}
+        data |= {n: [visible(getattr(m, n)) for m in each.marks] for n in ("hover", "block")}
         source = ColumnDataSource(data)
         plot.segment("x", "low", "x", "high", source=source, line_color=each.colour)
         named = {"legend_label": visible(each.name)} if each.name else {}
@@ -299,8 +299,8 @@ def _draw_series(plot: Any, series: Sequence[Series]) -> Iterator[Any]:
         yield source
 
 
-def _tell_limits(plot: Any, panel: PointAxes) -> None:
-    """Plain numbers on logarithmic axes; the legend below, where no point can lie under it."""
+def _label_limits(plot: Any, panel: PointAxes) -> None:
+    """Plain numbers on logarithmic axes; the legend below, where it covers no point."""
     from bokeh.models import CustomJSTickFormatter
 
     for axis, kind in ((plot.xaxis, panel.x_kind), (plot.yaxis, panel.y_kind)):

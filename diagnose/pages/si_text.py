@@ -1,10 +1,10 @@
-"""Numbers with their unit for people: a prefix of the SI, three digits."""
+"""Numbers with their unit as text: SI prefix, three digits."""
 
 import math
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 _PREFIXED = ("m", "N", "Pa", "Hz", "s", "V", "W")
-"""Units that take a prefix; metres no kilo."""
+"""Units that take a prefix; metres not kilo."""
 
 
 def si_text(value: float, unit: str = "", digits: int = 3) -> str:
@@ -13,11 +13,11 @@ def si_text(value: float, unit: str = "", digits: int = 3) -> str:
     Parameters
     ----------
     value : float
-        In `unit`.
+        Value in `unit`.
     unit : str
-        SI; one that is a product or a power takes no prefix, an angle is told in degrees.
+        SI unit; products and powers take no prefix, and an angle is shown in degrees.
     digits : int
-        Significant.
+        Number of significant digits.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def si_text(value: float, unit: str = "", digits: int = 3) -> str:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """A number with so many digits, without an exponent where that is short.
+    """A number with the given digits, without an exponent if that is short.
 
     Examples
     --------

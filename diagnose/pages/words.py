@@ -1,10 +1,10 @@
-"""Severity columns in words, for headings and sentences."""
+"""Names of severity columns, for headings and sentences."""
 
 import re
 
 
 def quantity_name(severity: str) -> str:
-    """Severity column in words, for headings.
+    """Name of a severity column, for headings.
 
     Examples
     --------
@@ -20,7 +20,7 @@ def quantity_name(severity: str) -> str:
 
 
 def severity_word(severity: str) -> str:
-    """What a severity column measures, in one or two words.
+    """Quantity of a severity column, in one or two words.
 
     Examples
     --------

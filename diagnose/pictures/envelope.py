@@ -1,4 +1,4 @@
-"""Panel of the envelope spectrum: what repeats the blows, held against a bearing's geometry."""
+"""Panel of the envelope spectrum: impact rates compared with a bearing's geometry."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ _HARMONICS = 3  # of a fault
 class _Envelope:
     """Envelope spectrum of a trace in the band of its kurtogram.
 
-    `faults` holds by name where geometry puts a fault [Hz], and what is found there.
+    `faults` holds, by name, the fault frequency by geometry [Hz] and the fault line found there.
     """
 
     trace: Trace
@@ -43,7 +43,7 @@ def envelope_panel(view: View) -> Panel:
     """Envelope spectra with the bearing's fault lines, or the shaft's orders."""
     traces, others = first_rows(view.casing)
     if not traces:
-        raise LackError("needs a channel on a casing, that is no proximity probe; record one")
+        raise LackError("needs a channel on a casing, other than a proximity probe; record one")
     if view.bearing is not None and view.speed is None:
         raise LackError("needs the shaft speed to place the bearing's lines; give speed or tacho")
     spectra = [_envelope_of(trace, view) for trace in traces]
@@ -52,7 +52,7 @@ def envelope_panel(view: View) -> Panel:
     )
     caption = "Envelope spectrum in the band of the highest kurtosis (kurtogram)"
     if view.bearing is not None:
-        caption += "; dashed lines: bearing geometry, with what is found there and its score"
+        caption += "; dashed lines: bearing geometry, with the line found there and its score"
     elif view.speed is not None:
         caption += f"; dotted: orders of {number(view.speed)} Hz"
     return Panel(
@@ -72,7 +72,7 @@ def _envelope_of(trace: Trace, view: View) -> _Envelope:
     faults = {}
     if view.bearing is not None and view.speed is not None:
         for name in _FAULT_COLOURS:
-            # a damaged roller strikes both races, hence twice a turn
+            # a damaged roller strikes both races, hence twice per turn
             strikes = 2 if name == "roller" else 1
             place = strikes * getattr(view.bearing, name) * view.speed
             faults[name] = place, _sought(frequency, amplitude, place)
@@ -82,7 +82,7 @@ def _envelope_of(trace: Trace, view: View) -> _Envelope:
 
 
 def _sought(frequency: Float, amplitude: NDArray[Any], place: float) -> FaultLine | None:
-    """What stands at a fault's lines; None where band or record are too short to tell."""
+    """Fault line near a frequency; None if band or record are too short."""
     try:
         return fault_line(frequency, amplitude, place, harmonics=_HARMONICS)
     except ValueError:
@@ -111,12 +111,12 @@ def _draw_envelopes(
 
 
 def _band_words(item: _Envelope) -> str:
-    """The band, and whether its kurtosis is more than noise has."""
+    """Text with the band, and its kurtosis compared with that of noise."""
     low, high = item.found.band
     scatter = float(item.found.deviation[item.found.best[0]])
     return (
         f"{item.trace.name}, {number(low)} … {number(high)} Hz: kurtosis "
-        f"{item.found.highest:.3g}, of noise 0 ± {scatter:.2g}"
+        f"{item.found.highest:.3g}, for noise 0 ± {scatter:.2g}"
     )
 
 

@@ -17,7 +17,7 @@ from .view import Trace, View, number
 
 _BLOCKS = 10  # whole blocks in a continuous force, overlapped by half
 _FINEST_HZ = 0.25  # between lines
-_DEPTH_DB = 20.0  # shown of a confidence disc that holds zero
+_DEPTH_DB = 20.0  # shown of a confidence disc that includes zero
 _CONFIDENCE = 0.95
 _SHOWN_SHARE = 1 / 2.56  # of the sample rate; above lies the slope of the anti-alias filter
 
@@ -30,11 +30,11 @@ def frf_panel(view: View) -> Panel:
         raise LackError(f"needs a force channel, has {count} in N; name the one that excites")
     responses, others = first_rows([trace for trace in view.motions if trace.name != force.name])
     if not responses:
-        raise LackError("needs a response beside the force; record one")
+        raise LackError("needs a response besides the force; record one")
     refuse_short(view, FEWEST_SAMPLES)
     rows = np.stack([trace.values for trace in responses])
     spectra, words = _averaged(force.values, rows, view.rate, view.exponential)
-    # zero frequency holds the drift of the sensors, the last lines the anti-alias filter
+    # the line at 0 Hz holds the drift of the sensors, the last lines the anti-alias filter
     kept = spectra.between(float(spectra.frequency[1]), _SHOWN_SHARE * view.rate)
     estimate = _estimate(kept)
     return Panel(
@@ -53,14 +53,14 @@ def frf_panel(view: View) -> Panel:
 def _averaged(
     force: NDArray[np.float32], responses: NDArray[np.float32], fs: float, last: float
 ) -> tuple[frf.Spectra, str]:
-    """Spectra of a hammer's blows or of a continuous force, and words about the averages."""
+    """Spectra of a hammer's blows or of a continuous force, and text about the averages."""
     longest = min(force.size / _BLOCKS, fs / _FINEST_HZ)
     nperseg = 1 << int(np.log2(max(longest, 8)))
     return transfer.excited_spectra(force, responses, fs, nperseg=nperseg, last=last)
 
 
 def _estimate(spectra: frf.Spectra) -> frf.Frf:
-    """H1 with what is known of its confidence: nothing from one blow."""
+    """H1 with its confidence, which is unknown for one blow."""
     if spectra.blocks > 1:
         return frf.estimate_frf(spectra, confidence=_CONFIDENCE)
     unknown = np.full(spectra.response.shape, np.nan)
@@ -85,7 +85,7 @@ def _draw_frf(place: Any, *, responses: Sequence[Trace], force: Trace, estimate:
         colour = COLOURS[i % len(COLOURS)]
         level, phase, share = axes[3 * i : 3 * i + 3]
         value = decibel(np.abs(estimate.value[i]) ** 2)
-        # a disc that holds zero reaches down for ever
+        # a disc that includes zero has no lower bound
         floor = np.maximum(decibel(low[i] ** 2), value - _DEPTH_DB)
         if known:
             level.fill_between(x, floor, decibel(high[i] ** 2), color=colour, alpha=0.3, lw=0)

@@ -1,6 +1,6 @@
 """Pictures of a recording, measured or simulated: a table of kinds.
 
-A kind first computes what it shows and makes a panel of it, or says what the recording lacks; only
+A kind first computes its data and makes a panel of them, or reports what the recording lacks; only
 then is anything drawn.
 """
 
@@ -19,7 +19,7 @@ from .spectrum import spectrum_panel, waveform_panel
 from .view import View
 
 AUTO = "auto"
-"""Kind that stands for every kind the recording supports, on one sheet."""
+"""Kind that stands for all kinds that the recording supports, on one sheet."""
 
 KINDS: dict[str, Callable[[View], Panel]] = {
     "waveform": waveform_panel,
@@ -31,7 +31,7 @@ KINDS: dict[str, Callable[[View], Panel]] = {
     "frf": frf_panel,
     "orbit": orbit_panel,
 }
-"""Kind -> what computes it; a new kind is one function and one row."""
+"""Function that computes each kind; a new kind is one function and one row."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,11 +42,11 @@ class Picture:
     ----------
     figure : matplotlib.figure.Figure
     panels : tuple of Panel
-        On it.
+        Its panels.
     drawn : tuple of str
-        Kinds on it.
+        Kinds drawn.
     left_out : dict
-        Kind -> why it is not on it.
+        Reason for each kind that is left out.
     """
 
     figure: Any
@@ -61,7 +61,7 @@ def plot_recording(view: View, kind: str = AUTO) -> Picture:
     Parameters
     ----------
     view : View
-        The recording, and what of it is wanted.
+        The recording, and what to draw of it.
     kind : str
         Key of :data:`KINDS`, or ``auto`` for all that the recording supports on one sheet.
 
@@ -72,7 +72,7 @@ def plot_recording(view: View, kind: str = AUTO) -> Picture:
     Raises
     ------
     DataError
-        The kind is unknown, or the recording lacks what it needs.
+        If the kind is unknown, or the recording lacks what it needs.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def make_panel(view: View, kind: str) -> Panel:
     Raises
     ------
     DataError
-        The kind is unknown, or the recording lacks what it needs.
+        If the kind is unknown, or the recording lacks what it needs.
     """
     if kind not in KINDS:
         near = difflib.get_close_matches(kind, KINDS, n=1)
@@ -128,9 +128,9 @@ Shown = TypeVar("Shown")
 
 
 def computed(kind: Callable[[View], Shown], view: View) -> Shown:
-    """What a kind shows; what the features refuse is a lack of the recording too."""
+    """Data of a kind; a refusal by the features counts as a lack of the recording, too."""
     if not view.traces:
-        raise LackError("needs a channel beside the tacho, has 0; record one")
+        raise LackError("needs a channel besides the tacho, has 0; record one")
     try:
         return kind(view)
     except LackError:

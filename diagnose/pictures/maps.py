@@ -32,18 +32,18 @@ _DYNAMIC_DB = 60.0  # shown below the highest level
 _MOST_COLUMNS = 800
 _MOST_FRAMES = 160
 _SHOWN_ORDERS = 20.0
-_POINTS = 64  # a revolution: orders up to 25 are right
-_FEWEST_REVOLUTIONS = 8  # of an order map: two frames of the shortest
+_POINTS = 64  # per revolution: orders up to 25 are correct
+_FEWEST_REVOLUTIONS = 8  # for an order map: two frames of the shortest
 
 
 def _hertz(highest: float) -> tuple[str, float]:
-    """Unit of a linear frequency axis, and hertz in it."""
+    """Unit of a linear frequency axis, and its value in hertz."""
     return ("kHz", 1e3) if highest >= 5000 else ("Hz", 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Map:
-    """Levels over two axes, the edges of the cells with them."""
+    """Levels over two axes, with the edges of the cells."""
 
     trace: Trace
     x: Float
@@ -85,7 +85,7 @@ def _steps(middles: Float) -> Float:
 
 
 def _merged(level: Float, edges: Float, most: int) -> tuple[Float, Float]:
-    """Neighbouring columns together where there are too many, the highest of them shown."""
+    """Adjacent columns merged if there are too many, keeping the highest values."""
     count = -(-level.shape[1] // most)
     starts = np.arange(0, level.shape[1], count)
     kept = np.append(edges[:-1][starts], edges[-1])
@@ -100,7 +100,7 @@ def waterfall_panel(view: View) -> Panel:
     hop = max(nperseg // 4, -(-(view.n_samples - nperseg) // (_MOST_FRAMES - 1)))
     traces, others = first_rows(view.motions)
     if not traces:
-        raise LackError("needs a channel that is no force; draw one")
+        raise LackError("needs a channel other than a force; draw one")
     unit, scale = _hertz(view.rate / 2)
     maps = [
         _Map(trace=trace, x=x / scale, y=y, level=level, unit=f"dB re 1\n{trace.square}/Hz")
@@ -132,7 +132,7 @@ def _spectra_over_time(
 
 
 def _nothing(_axis: Any) -> None:
-    """No limits of its own."""
+    """No additional limits."""
 
 
 def orders_panel(view: View) -> Panel:
@@ -140,7 +140,7 @@ def orders_panel(view: View) -> Panel:
     turning = turning_of(view)
     traces, others = first_rows(view.motions)
     if not traces:
-        raise LackError("needs a channel that is no force; draw one")
+        raise LackError("needs a channel other than a force; draw one")
     rows = np.stack([trace.values for trace in traces])
     angle = angular_resample(rows, turning.phase, points_per_revolution=_POINTS)
     if angle.revolutions < _FEWEST_REVOLUTIONS:
@@ -206,7 +206,7 @@ def angle_panel(view: View) -> Panel:
     turning = turning_of(view)
     traces, others = first_rows(view.casing)
     if not traces:
-        raise LackError("needs a channel on a casing, that is no proximity probe; record one")
+        raise LackError("needs a channel on a casing, other than a proximity probe; record one")
     if fault := crank_map_fault(view.rate):
         raise LackError(f"cannot be computed: {fault}")
     refuse_short(view, default_window(view.rate)[0])

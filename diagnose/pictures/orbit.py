@@ -14,8 +14,8 @@ from .panel import COLOURS, MOST_POINTS, WIDTH, LackError, Panel
 from .view import Float, Trace, Turning, View
 
 _SHOWN_REVOLUTIONS = 10
-_MOST_ORDERS = 4.0  # of the full spectrum, to either side
-_SECOND_LINE = 0.15  # inch: in a narrow picture the names of the probes have a line of their own
+_MOST_ORDERS = 4.0  # of the full spectrum, on either side
+_SECOND_LINE = 0.15  # inch: in a narrow picture the names of the probes have a separate line
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,7 +49,7 @@ def orbit_panel(view: View) -> Panel:
 
 
 def probe_pairs(view: View) -> list[tuple[Trace, Trace]]:
-    """Two probes of the recording, or two of each place where there are more."""
+    """Two probes of the recording, or two at each place if there are more."""
     probes = [trace for trace in view.traces if trace.quantity == DISPLACEMENT]
     if len(probes) == 2:
         return [(probes[0], probes[1])]
@@ -67,7 +67,7 @@ def probe_pairs(view: View) -> list[tuple[Trace, Trace]]:
 
 
 def shown_samples(view: View) -> int:
-    """Samples of an orbit that are drawn: a few revolutions, no more than can be told apart."""
+    """Number of samples of an orbit that are drawn: a few distinguishable revolutions."""
     n = view.n_samples if view.speed is None else round(_SHOWN_REVOLUTIONS / view.speed * view.rate)
     return min(view.n_samples, max(n, 2), MOST_POINTS)
 

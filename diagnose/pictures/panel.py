@@ -1,6 +1,6 @@
-"""A panel of a picture: computed first, then drawn; what all panels share, and the sheet of them.
+"""A panel of a picture: computed first, then drawn; shared helpers, and the sheet of panels.
 
-Figures are matplotlib's without pyplot, in fixed margins.
+Figures use matplotlib without pyplot, in fixed margins.
 """
 
 import textwrap
@@ -16,29 +16,29 @@ from ..pages.picture import PAGE_WIDTH
 from .view import Trace, Turning, View
 
 COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4a8c", "#8a7a14", "#2a8a8a", "#a0405f", "#5b6470")
-"""Of channels, one after the other."""
+"""Colours of successive channels."""
 
 WIDTH = 8.0
-"""Of a panel on a sheet [inch]."""
+"""Width of a panel on a sheet [inch]."""
 
 RIGHT_OF_MAP = 0.7
-"""Margin that holds the unit beside a bar of colours [inch]."""
+"""Margin for the unit next to a colour bar [inch]."""
 
 MOST_ROWS = 4
-"""Channels drawn by kinds that give each a row of its own, but for the waveform."""
+"""Most channels drawn by kinds that give each its own row, except for the waveform."""
 
 MOST_POINTS = 4000
-"""Of a curve; more cannot be seen."""
+"""Most points of a curve; more cannot be distinguished."""
 
 CURSOR_ORDERS = 20
-"""Orders marked in a spectrum."""
+"""Number of orders marked in a spectrum."""
 
 _NAMED_CURSORS = (1, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)  # those with room for a number
-_LEFT, _RIGHT, _BOTTOM, _TOP = 0.85, 0.25, 0.5, 0.12  # inch, round a panel
+_LEFT, _RIGHT, _BOTTOM, _TOP = 0.85, 0.25, 0.5, 0.12  # inch, around a panel
 _LINE_HEIGHT = 0.17  # inch, of a line of a caption
-_LETTERS = 118  # of a caption in a line
+_LETTERS = 118  # of a caption, per line
 _HEAD = 0.45  # inch, of the sheet's heading
-_HEADING_LETTERS = 80  # of it in the width of a panel
+_HEADING_LETTERS = 80  # of the heading, in the width of a panel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,11 +48,11 @@ class Panel:
     Parameters
     ----------
     kind : str
-        What it is, a key of the table of kinds.
+        Key of the table of kinds.
     caption : str
-        What it shows and how it was computed.
+        Description of what it shows and how it was computed.
     height : float
-        It needs, without caption [inch].
+        Height needed, without caption [inch].
     draw : callable
         ``draw(place)`` draws it into an empty figure or subfigure.
     right : float
@@ -60,7 +60,7 @@ class Panel:
     above : float
         Room for titles above the axes [inch].
     below : float
-        Room for a second line of a label below them [inch].
+        Room for a second label line below them [inch].
     """
 
     kind: str
@@ -73,11 +73,11 @@ class Panel:
 
 
 class LackError(ValueError):
-    """What a recording lacks for a kind."""
+    """Something that a recording lacks for a kind."""
 
 
 def panel_figure(panel: Panel) -> Any:
-    """A panel alone, as wide as a phone shows, without caption: a page has its own."""
+    """A single panel, as wide as a phone, without caption: a page has its own."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(PAGE_WIDTH, panel.height))
@@ -87,7 +87,7 @@ def panel_figure(panel: Panel) -> Any:
 
 
 def columns_of(panels: Sequence[Panel]) -> list[list[Panel]]:
-    """Panels in two columns about equally high; one panel in one."""
+    """Panels in two columns of about equal height; a single panel in one."""
     if len(panels) == 1:
         return [list(panels)]
     columns: list[list[Panel]] = [[], []]
@@ -160,7 +160,7 @@ def _set_margins(
 
 
 def stack(place: Any, n: int, **options: Any) -> NDArray[Any]:
-    """Axes below each other, on one x axis unless told otherwise."""
+    """Axes below each other, sharing the x axis by default."""
     axes = place.subplots(n, 1, squeeze=False, **{"sharex": True} | options)[:, 0]
     place.subplots_adjust(hspace=0.12)
     for each in axes:
@@ -183,7 +183,7 @@ def name_inside(axes: Any, trace: Trace) -> None:
 
 
 def first_rows(traces: Sequence[Trace]) -> tuple[list[Trace], str]:
-    """As many traces as have room, and words about the others."""
+    """As many traces as have room, and text about the others."""
     if len(traces) <= MOST_ROWS:
         return list(traces), ""
     return list(traces[:MOST_ROWS]), f"; first {MOST_ROWS} of {len(traces)} channels"
@@ -199,7 +199,7 @@ def log_frequency(axes: Any, which: str) -> None:
 
 
 def order_cursors(axes: Any, speed: float | None, low: float, high: float) -> None:
-    """Dotted lines at the shaft's orders, with a number at the top of some."""
+    """Dotted lines at the shaft's orders, some with a number at the top."""
     if speed is None:
         return
     for order in range(1, CURSOR_ORDERS + 1):
@@ -210,7 +210,7 @@ def order_cursors(axes: Any, speed: float | None, low: float, high: float) -> No
 
 
 def _at_top(axes: Any, x: float, text: str, colour: str) -> None:
-    """A word inside the upper edge, at x."""
+    """A text inside the upper edge, at x."""
     axes.annotate(
         text,
         (x, 1),
@@ -224,19 +224,19 @@ def _at_top(axes: Any, x: float, text: str, colour: str) -> None:
 
 
 def refuse_short(view: View, least: int) -> None:
-    """LackError below a number of samples."""
+    """LackError for recordings below a number of samples."""
     if view.n_samples < least:
         raise LackError(f"needs >= {least} samples, has {view.n_samples}; record longer")
 
 
 def turning_of(view: View) -> Turning:
-    """How the shaft turns; LackError where that is not known."""
+    """Rotation of the shaft; LackError if it is unknown."""
     if isinstance(view.turning, str):
         raise LackError(view.turning)
     return view.turning
 
 
 def from_zero(axes: Any, curves: Sequence[NDArray[Any]]) -> None:
-    """From 0 to above the highest point, with room for the words at the top."""
+    """Limits from 0 to above the highest point, with room for the text at the top."""
     highest = max(float(np.max(curve)) for curve in curves)
     axes.set_ylim(0, 1.2 * highest if highest > 0 else 1.0)

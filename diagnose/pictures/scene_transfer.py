@@ -14,18 +14,18 @@ from ..pages.page import short_name
 from ..pages.picture import save_picture
 
 LINES = 4000
-"""Of a transfer function, evenly spread; the closest that a picture can show."""
+"""Lines of a transfer function, evenly spaced; the closest spacing that a picture can show."""
 
 PASS_SHARE = 0.45
-"""Highest frequency by default, over the sample rate of the scene."""
+"""Default highest frequency, over the sample rate of the scene."""
 
 LOW_SHARE = 1 / 300
-"""Lowest frequency by default, over the highest: two and a half decades."""
+"""Default lowest frequency, over the highest: two and a half decades."""
 
 _PROMINENCE_DB = 3.0
-_SHOWN = 5  # peaks of a path that are told
+_SHOWN = 5  # peaks of a path that are listed
 _COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a", "#a0306a")
-_TINY = 1e-300  # against the logarithm of zero
+_TINY = 1e-300  # avoids the logarithm of zero
 
 
 def transfer_of(scene: Scene, low: float | None = None, high: float | None = None) -> SceneTransfer:
@@ -36,7 +36,7 @@ def transfer_of(scene: Scene, low: float | None = None, high: float | None = Non
     scene : Scene
         A pump or a shaft line.
     low, high : float, optional
-        [Hz]; by default up to 0.45 of the sample rate, from a three-hundredth of that.
+        Band [Hz]; by default up to 0.45 of the sample rate, from a three-hundredth of that.
 
     Returns
     -------
@@ -45,9 +45,9 @@ def transfer_of(scene: Scene, low: float | None = None, high: float | None = Non
     Raises
     ------
     ValueError
-        The band is empty.
+        If the band is empty.
     SceneError
-        As :func:`wearstate.sim.machine.transfer.scene_transfer`.
+        As for :func:`wearstate.sim.machine.transfer.scene_transfer`.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def transfer_of(scene: Scene, low: float | None = None, high: float | None = Non
 
 
 class BandError(ValueError):
-    """A band that holds no frequency."""
+    """A band without a frequency in it."""
 
 
 def peaks_of(found: SceneTransfer) -> dict[str, list[dict[str, float]]]:
@@ -97,11 +97,11 @@ def _level(values: Any) -> Any:
 
 
 def transfer_text(scene: Scene, found: SceneTransfer) -> str:
-    """The peaks of every path, a line each, for a terminal."""
+    """The peaks of every path, one line each, for a terminal."""
     lines = [f"{scene.name} (simulated): accelerance [dB re 1 (m/s²)/N], highest peaks"]
     for path, peaks in peaks_of(found).items():
-        told = ", ".join(f"{p['frequency_hz']:.4g} Hz {p['level_db']:+.1f}" for p in peaks[:_SHOWN])
-        lines.append(f"  {path:32} {told or 'no peak'}")
+        text = ", ".join(f"{p['frequency_hz']:.4g} Hz {p['level_db']:+.1f}" for p in peaks[:_SHOWN])
+        lines.append(f"  {path:32} {text or 'no peak'}")
     return "\n".join(lines)
 
 
@@ -116,7 +116,7 @@ def transfer_table(scene: Scene, found: SceneTransfer) -> dict[str, Any]:
 
 
 def save_csv(found: SceneTransfer, path: Path, *, force: bool = False) -> None:
-    """Write real and imaginary part of every path, in the form that ``casing.frf`` reads.
+    """Write real and imaginary part of every path, in the format that ``casing.frf`` reads.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def save_csv(found: SceneTransfer, path: Path, *, force: bool = False) -> None:
 
 
 def transfer_figure(scene: Scene, found: SceneTransfer) -> Any:
-    """Magnitude and phase of every path: a column for each place that is pushed.
+    """Magnitude and phase of every path: one column for each excited place.
 
     Parameters
     ----------

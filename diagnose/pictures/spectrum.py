@@ -32,14 +32,14 @@ from .view import Float, Trace, Turning, View, number, thinned
 
 _SHOWN_REVOLUTIONS = 2  # of a waveform
 _LOWEST_SHOWN = 10.0  # Hz, of a density
-_LINES_PER_ORDER = 5  # spectral lines from one order to the next, to tell them apart
+_LINES_PER_ORDER = 5  # spectral lines between orders, to separate them
 _LEGEND_COLUMNS = 4
 
 # --- waveform
 
 
 def waveform_panel(view: View) -> Panel:
-    """The first two revolutions, or the whole record where the speed is not known."""
+    """The first two revolutions, or the whole record if the speed is unknown."""
     n = view.n_samples
     if view.speed is not None:
         n = max(2, min(n, round(_SHOWN_REVOLUTIONS / view.speed * view.rate)))
@@ -84,7 +84,7 @@ def _draw_waveform(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Spectra:
-    """Density, and where the speed is known the lines about the orders, of one unit's channels."""
+    """Density, and if the speed is known the lines about the orders, for channels of one unit."""
 
     traces: list[tuple[int, Trace]]
     density: list[tuple[Float, Float]]  # frequency [Hz], level [dB]
@@ -129,16 +129,16 @@ def spectrum_panel(view: View) -> Panel:
 
 
 def _order_lines(view: View) -> tuple[int, float]:
-    """Samples of segments that tell the orders apart, and how far those are shown [Hz].
+    """Length of segments that separate the orders [samples], and the highest frequency shown [Hz].
 
-    (0, 0) where the speed is not known or the record too short.
+    (0, 0) if the speed is unknown or the record too short.
     """
     if view.speed is None:
         return 0, 0.0
     wanted = 1 << int(np.ceil(np.log2(_LINES_PER_ORDER * view.rate / view.speed)))
     if wanted > view.n_samples:
         return 0, 0.0
-    # longer where three segments, overlapped by half, still fit: sharper lines
+    # longer if three segments, overlapped by half, still fit: sharper lines
     longest = 1 << int(np.log2(view.n_samples // 2))
     highest = min((CURSOR_ORDERS + 0.5) * view.speed, view.rate / 2)
     return max(wanted, min(longest, default_nperseg(view.rate, view.n_samples))), highest
@@ -176,7 +176,7 @@ def _draw_density(axes: Any, group: _Spectra, span: tuple[float, float]) -> None
         shown.append(level[frequency >= span[0]])
     lowest = min(float(level.min()) for level in shown)
     highest = max(float(level.max()) for level in shown)
-    room = max(highest - lowest, 10.0)  # of a silent channel, none
+    room = max(highest - lowest, 10.0)  # a silent channel has no range
     legend_rows = -(-len(shown) // _LEGEND_COLUMNS)
     axes.set_ylim(lowest - 0.05 * room, highest + (0.06 + 0.1 * legend_rows) * room)
     axes.set_ylabel(f"PSD\n[dB re 1 {group.unit.square}/Hz]", fontsize=9)

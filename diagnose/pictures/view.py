@@ -1,4 +1,4 @@
-"""One recording ready to be drawn: signals in the units people use, and how its shaft turns."""
+"""One recording prepared for drawing: signals in usual units, and the rotation of its shaft."""
 
 import difflib
 import math
@@ -25,21 +25,21 @@ _SHOWN = {
     "m/s^2": ("m/s²", 1.0),
     "Pa": ("kPa", 1e-3),
 }
-"""SI unit -> unit in which a signal is spoken of, and factor to it."""
+"""Usual unit of a signal and factor to it, by SI unit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """One channel as a picture shows it.
+    """One channel as shown in a picture.
 
     Parameters
     ----------
     name, quantity, place : str
-        Of the channel.
+        Name, quantity and place of the channel.
     unit : str
-        Unit of `values`, for people.
+        Usual unit of `values`.
     values : ndarray, shape (n_samples,)
-        [`unit`]
+        Signal [`unit`].
     """
 
     name: str
@@ -50,20 +50,20 @@ class Trace:
 
     @property
     def square(self) -> str:
-        """Unit of its mean square, for people: ``(m/s²)²``, ``µm²``."""
+        """Unit of the mean square as text: ``(m/s²)²``, ``µm²``."""
         return f"({self.unit})²" if set(self.unit) & set("/²^ ") else f"{self.unit}²"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Turning:
-    """How the shaft turns, by its tacho.
+    """Rotation of the shaft, from its tacho.
 
     Parameters
     ----------
     pulses : ndarray, shape (n_pulses,)
-        One a revolution [s].
+        Pulse times, one per revolution [s].
     phase : ndarray, shape (n_samples,)
-        [rev], 0 at the first pulse.
+        Shaft phase [rev], 0 at the first pulse.
     """
 
     pulses: Float
@@ -72,7 +72,7 @@ class Turning:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """What is to be drawn of a recording.
+    """A recording and what to draw of it.
 
     Parameters
     ----------
@@ -80,19 +80,18 @@ class View:
     channels : sequence of str
         Names of those to draw; all but the tacho by default.
     force : str, optional
-        Name of the channel that holds the force of a transfer function; the only channel in N by
-        default.
+        Name of the force channel of a transfer function; by default the only channel in N.
     speed_hz : float, optional
-        Shaft speed where the recording has no tacho; it goes before the declared one [Hz].
+        Shaft speed if the recording has no tacho [Hz]; it takes precedence over the declared one.
     bearing : BearingFrequencies, optional
-        Of a rolling bearing at one revolution per second, that is in orders.
+        Fault frequencies of a rolling bearing at one revolution per second, that is in orders.
     exponential : float
-        What the exponential window of an impact test has sunk to at the end of a block [-].
+        Value of the exponential window of an impact test at the end of a block [-].
 
     Raises
     ------
     DataError
-        A channel is not in the recording, or the speed is not > 0; all faults at once.
+        If a channel is not in the recording, or the speed is not > 0; all faults at once.
 
     Examples
     --------
@@ -112,10 +111,10 @@ class View:
 
     def __post_init__(self) -> None:
         known = self.recording.vibration_names
-        asked = [*self.channels, *([] if self.force is None else [self.force])]
+        requested = [*self.channels, *([] if self.force is None else [self.force])]
         faults = [
             f"{self.recording.source} has no channel {name!r}{_nearest(name, known)}"
-            for name in asked
+            for name in requested
             if name not in known
         ]
         if self.speed_hz is not None and not 0 < self.speed_hz < math.inf:
@@ -130,7 +129,7 @@ class View:
 
     @property
     def n_samples(self) -> int:
-        """Samples of each channel."""
+        """Number of samples per channel."""
         return int(self.recording.signal.shape[1])
 
     @cached_property
@@ -146,7 +145,7 @@ class View:
 
     @cached_property
     def excitation(self) -> Trace | None:
-        """The force; None where no channel is named and not exactly one is in N."""
+        """The force; None if no channel is named and not exactly one is in N."""
         items = zip(self.recording.vibration_channels, self.recording.vibration, strict=True)
         found = [
             _trace(channel, row)
@@ -157,22 +156,22 @@ class View:
 
     @property
     def motions(self) -> tuple[Trace, ...]:
-        """Channels to draw but forces."""
+        """Channels to draw, except forces."""
         return tuple(
             trace for trace in self.traces if trace.quantity != FORCE and trace.name != self.force
         )
 
     @property
     def casing(self) -> tuple[Trace, ...]:
-        """Those of `motions` that no proximity probe measures: what knocks and rings."""
+        """Members of `motions` other than proximity probes, which show impacts and ringing."""
         return tuple(trace for trace in self.motions if trace.quantity != DISPLACEMENT)
 
     @cached_property
     def turning(self) -> Turning | str:
-        """How the shaft turns, or why that is not known."""
+        """Rotation of the shaft, or the reason why it is unknown."""
         recording = self.recording
         if recording.tacho_signal is None:
-            return "needs a tacho, of which the recording names none; name its channel with tacho"
+            return "needs a tacho, which the recording does not name; name its channel with tacho"
         per_turn = recording.pulses_per_revolution
         try:
             pulses = pulse_times(recording.tacho_signal, self.rate)
@@ -183,7 +182,7 @@ class View:
 
     @cached_property
     def speed(self) -> float | None:
-        """Mean shaft speed [Hz]: by the tacho, as given, or as declared; None where unknown."""
+        """Mean shaft speed [Hz]: by the tacho, as given, or as declared; None if unknown."""
         if isinstance(self.turning, Turning):
             phase = self.turning.phase
             return float((phase[-1] - phase[0]) / (self.n_samples - 1) * self.rate)
@@ -191,7 +190,7 @@ class View:
 
     @property
     def heading(self) -> str:
-        """Source, origin and extent of the recording, for the head of a picture."""
+        """Source, origin and extent of the recording, for the title of a picture."""
         recording = self.recording
         speed = "" if self.speed is None else f", {number(self.speed)} rev/s"
         return (
@@ -217,7 +216,7 @@ def _nearest(name: str, known: Sequence[str]) -> str:
 
 
 def number(value: float) -> str:
-    """A number with four figures, and no power of ten up to a million.
+    """A number with four significant digits, without exponent up to a million.
 
     Examples
     --------
@@ -230,21 +229,21 @@ def number(value: float) -> str:
 def thinned(
     x: NDArray[Any], y: NDArray[Any], most: int, *, logarithmic: bool = False
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Points of a curve that are enough to draw it: the extremes of short pieces.
+    """Enough points of a curve to draw it: the extremes of short pieces.
 
     Parameters
     ----------
     x, y : ndarray, shape (n,)
-        Curve; x rising, above 0 where `logarithmic`.
+        Curve; x rising, above 0 if `logarithmic`.
     most : int
-        Points that can be told apart.
+        Number of points that can be distinguished.
     logarithmic : bool
         Whether the pieces are equally long on a logarithmic axis.
 
     Returns
     -------
     x, y : ndarray, shape (at most about `most`,)
-        Some of the points, in order: no peak is lost, none is moved.
+        Some of the points, in order: no peak is lost or moved.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Curves that can be zoomed and measured with a cursor in a page that needs no network.
+"""Curves with zoom and cursors in a page that works offline.
 
-Bokeh draws them: an optional library, whose script goes into the page from the installed package.
+They are drawn by Bokeh, an optional library whose script is embedded from the installed package.
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from .panel import COLOURS
 from .zoom_curves import ZoomCurve
 
 STILL_COLOURS = 128
-"""Of the picture that stands for the curves on paper."""
+"""Colours of the picture that replaces the curves in print."""
 
 _FEWEST_POINTS = 200  # of a curve
 _POINT_BYTES = 2 * 4 * 4 / 3  # x and y as single floats in base64
 _CURVE_BYTES = 9_000  # axes and tools
 _HARMONICS, _SIDEBANDS = 10, 3
-_MARGIN = 0.05  # of the values' range, above and below
+_MARGIN = 0.05  # of the range of values, above and below
 _HEIGHT, _ORBIT_HEIGHT = 240, 420  # [px]
 
 _CLEAR = """
@@ -85,11 +85,11 @@ class ZoomBlock:
     Parameters
     ----------
     script : str
-        Of the library, as HTML.
+        Script of the library as HTML.
     item : str
-        Curves and tools as JSON that may stand in HTML.
+        Curves and tools as JSON that can be placed in HTML.
     shares : tuple of tuple
-        Of every curve that was thinned: title, points drawn, points computed.
+        For every thinned curve: title, points drawn, points computed.
     """
 
     script: str
@@ -104,9 +104,9 @@ def zoom_block(curves: Sequence[ZoomCurve], *, speed: float | None, taken: int =
     ----------
     curves : sequence of ZoomCurve
     speed : float, optional
-        Of the shaft, for orders [Hz].
+        Speed of the shaft, for orders [Hz].
     taken : int
-        Bytes of the rest of the page: so much less is left for points.
+        Size of the rest of the page, which reduces the room for points [byte].
 
     Returns
     -------
@@ -115,7 +115,7 @@ def zoom_block(curves: Sequence[ZoomCurve], *, speed: float | None, taken: int =
     Raises
     ------
     DataError
-        Bokeh is not installed.
+        If Bokeh is not installed.
     """
     require_bokeh()
     script = bokeh_script()
@@ -134,7 +134,7 @@ def zoom_block(curves: Sequence[ZoomCurve], *, speed: float | None, taken: int =
 
 
 def _share(sizes: Sequence[int], total: int) -> int:
-    """Points of a long curve where all share a total; what short ones leave, long ones get.
+    """Points of a long curve if all share a total; what short ones leave goes to long ones.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def zoom_page(
     speed: float | None,
     missing: Any = (),
 ) -> str:
-    """A page of curves, with pictures for paper and for readers without scripts.
+    """A page of curves, with pictures for printing and for readers without scripts.
 
     Parameters
     ----------
@@ -165,16 +165,16 @@ def zoom_page(
     stills : sequence of (str, PageImage)
         Captions and pictures.
     heading : str
-        Of the recording.
+        Title of the recording.
     speed : float, optional
-        Of the shaft [Hz].
+        Speed of the shaft [Hz].
     missing : mapping
-        Kind -> what the recording lacks for it.
+        What the recording lacks, by kind.
 
     Returns
     -------
     str
-        HTML.
+        HTML page.
     """
     block = zoom_block(curves, speed=speed, taken=sum(len(image.address) for _, image in stills))
     return render(
@@ -183,15 +183,15 @@ def zoom_page(
 
 
 def _column(curves: Sequence[ZoomCurve], speed: float | None) -> Any:
-    """Figures one below the other; those of a kind share axis and crosshair, all one cursor."""
+    """Figures one below the other; those of a kind share axis and crosshair, all the cursor."""
     from bokeh.events import DoubleTap, Tap
     from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, CustomJS, Range1d
     from bokeh.models.annotations.geometry import Span
 
     cursor = ColumnDataSource({"hz": [], "order": [], "width": [], "colour": []}, tags=[0, 0])
-    told = {"cursor": cursor, "speed": speed, "harmonics": _HARMONICS, "sidebands": _SIDEBANDS}
-    place, clear = CustomJS(args=told, code=_CURSOR), CustomJS(args=told, code=_CLEAR)
+    arguments = {"cursor": cursor, "speed": speed, "harmonics": _HARMONICS, "sidebands": _SIDEBANDS}
+    place, clear = CustomJS(args=arguments, code=_CURSOR), CustomJS(args=arguments, code=_CLEAR)
     shared: dict[str, tuple[Any, Any]] = {}
     figures = []
     for number, curve in enumerate(curves):
@@ -210,7 +210,7 @@ def _column(curves: Sequence[ZoomCurve], speed: float | None) -> Any:
 
 
 def _extent(values: Any, margin: float) -> tuple[float, float]:
-    """Least and greatest finite value with room beside them; 1 where there is no other extent."""
+    """Smallest and largest finite value with a margin; an extent of 1 if they are equal."""
     finite = np.asarray(values)[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     room = margin * (high - low) if high > low else 0.5
@@ -239,7 +239,7 @@ def _figure(curve: ZoomCurve, x_range: Any, across: Any, colour: str) -> Any:
     wheel = WheelZoomTool(dimensions="both" if around else "width", modifiers="ctrl")
     zoom = BoxZoomTool(dimensions="both" if around else "auto", match_aspect=around)
     plot = figure(
-        # plain: a name between dollar signs is no formula, which would need the network
+        # plain: a name between dollar signs is not a formula, which would need the network
         title=Title(text=PlainText(text=curve.title)),
         x_axis_label=PlainText(text=curve.x_name),
         y_axis_label=PlainText(text=curve.y_name),
@@ -250,7 +250,7 @@ def _figure(curve: ZoomCurve, x_range: Any, across: Any, colour: str) -> Any:
         sizing_mode="stretch_width",
         toolbar_location="above",
         min_border_right=18,  # half of the last number
-        toolbar_sticky=False,  # in a row of its own: beside a long title a phone shows no tool
+        toolbar_sticky=False,  # in a separate row: next to a long title a phone would show no tools
         tools=[zoom, wheel, PanTool(), ResetTool(), CrosshairTool(overlay=(across, along))],
         active_drag=zoom,
         active_scroll=wheel,
@@ -265,7 +265,7 @@ def _figure(curve: ZoomCurve, x_range: Any, across: Any, colour: str) -> Any:
 
 
 def _draw_cursor(plot: Any, curve: ZoomCurve, cursor: Any) -> None:
-    """Lines at the harmonics and sidebands that a tap has asked for."""
+    """Lines at the harmonics and sidebands selected by a tap."""
     plot.vspan(
         x="order" if curve.kind == "orders" else "hz",
         source=cursor,
@@ -277,7 +277,7 @@ def _draw_cursor(plot: Any, curve: ZoomCurve, cursor: Any) -> None:
 
 
 def _add_hover(plot: Any, curve: ZoomCurve, speed: float | None) -> None:
-    """Values of the point below the pointer: of a spectrum frequency, order and level."""
+    """Values of the point under the pointer: for a spectrum frequency, order and level."""
     from bokeh.models import CustomJSHover, HoverTool
 
     def times(factor: float) -> Any:

@@ -1,7 +1,7 @@
-"""Curves of a recording that can be looked at closely: waveform, spectra, orbit, as values.
+"""Curves of a recording for close inspection, as values: waveform, spectra, orbit.
 
-A kind computes its curves with the public functions of ``features.catalogue.curves``, in the units
-people use, or says what the recording lacks.
+A kind computes its curves in usual units with the public functions of
+``features.catalogue.curves``, or reports what the recording lacks.
 """
 
 from collections.abc import Callable
@@ -28,27 +28,27 @@ from .panel import LackError
 from .view import Trace, Turning, View, thinned
 
 MOST_CHANNELS = 8
-"""In a page."""
+"""Most channels in a page."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ZoomCurve:
-    """One line on axes of its own.
+    """One line on its own axes.
 
     Parameters
     ----------
     kind : str
-        Key of :data:`ZOOM_KINDS`; curves of a kind share their x axis, but for orbits.
+        Key of :data:`ZOOM_KINDS`; curves of a kind share their x axis, except for orbits.
     title, x_name, y_name : str
-        Head and axes, with units.
+        Title and axis names, with units.
     x, y : ndarray, shape (n,)
-        In the units named; x rising, but for an orbit.
+        Values in the units named; x rising, except for an orbit.
     unit : str
-        Of y.
+        Unit of y.
     hz : float, optional
-        Frequency of one unit of x [Hz]; None where x is no frequency.
+        Frequency of one unit of x [Hz]; None if x is not a frequency.
     reach : float
-        Distance on x within which only the highest and lowest point are left, 0 where all are.
+        Distance on x within which only the highest and lowest point are kept, 0 if all are.
     """
 
     kind: str
@@ -62,7 +62,7 @@ class ZoomCurve:
     reach: float = 0.0
 
     def thinned(self, most: int) -> "ZoomCurve":
-        """The curve with at most about so many points, no peak lost; an orbit is cut short.
+        """The curve with at most about that many points, peaks kept; an orbit is cut short.
 
         Examples
         --------
@@ -83,12 +83,12 @@ class ZoomCurve:
 
 
 def zoom_curves(view: View, kind: str = AUTO) -> tuple[list[ZoomCurve], dict[str, str]]:
-    """Curves of a recording, and why a kind has none.
+    """Curves of a recording, and why some kinds have none.
 
     Parameters
     ----------
     view : View
-        The recording, and what of it is wanted.
+        The recording, and what to draw of it.
     kind : str
         Key of :data:`ZOOM_KINDS`, or ``auto`` for all that the recording supports.
 
@@ -96,12 +96,12 @@ def zoom_curves(view: View, kind: str = AUTO) -> tuple[list[ZoomCurve], dict[str
     -------
     curves : list of ZoomCurve
     left_out : dict
-        Kind -> what the recording lacks for it.
+        What the recording lacks, by kind.
 
     Raises
     ------
     DataError
-        The kind has no curve to look at closely, or the recording supports none that is asked for.
+        If the kind has no interactive curve, or the recording supports none of those requested.
     """
     if kind not in (AUTO, *ZOOM_KINDS):
         known = ", ".join((AUTO, *ZOOM_KINDS))
@@ -120,7 +120,7 @@ def zoom_curves(view: View, kind: str = AUTO) -> tuple[list[ZoomCurve], dict[str
 
 
 def _first_channels(view: View) -> tuple[View, dict[str, str]]:
-    """The view of no more channels than a page can hold, and what is told of the others."""
+    """The view with no more channels than fit into a page, and text about the others."""
     names = [trace.name for trace in view.traces]
     if len(names) <= MOST_CHANNELS:
         return view, {}
@@ -166,9 +166,9 @@ def _orders(view: View) -> list[ZoomCurve]:
 
 
 def _envelopes(view: View) -> list[ZoomCurve]:
-    """Each in the band of its highest kurtosis, as the picture has it."""
+    """Envelope spectra, each in the band of its highest kurtosis, as in the picture."""
     if not view.casing:
-        raise LackError("needs a channel on a casing, that is no proximity probe; record one")
+        raise LackError("needs a channel on a casing, other than a proximity probe; record one")
     levels = kurtogram_levels(view.n_samples, view.rate, envelope_span(view.speed, view.bearing))
     curves = []
     for trace in view.casing:
@@ -206,11 +206,11 @@ ZOOM_KINDS: dict[str, Callable[[View], list[ZoomCurve]]] = {
     "envelope": _envelopes,
     "orbit": _orbits,
 }
-"""Kind -> what computes its curves."""
+"""Function that computes the curves of each kind."""
 
 
 def _stacked(view: View) -> tuple[NDArray[Any], tuple[str, ...]]:
-    """Signals in the units people use [shape=(n_channels, n_samples)], and their names."""
+    """Signals in usual units [shape=(n_channels, n_samples)], and their names."""
     return np.stack([trace.values for trace in view.traces]), tuple(t.name for t in view.traces)
 
 

@@ -87,7 +87,7 @@ def _mark(row: BatchRow, factor: float, trend: Trend) -> Mark:
         lines.append(row.note)
     text = "\n".join(lines)
     return Mark(
-        x=factor * hours, y=1e3 * value, low=1e3 * low, high=1e3 * high, told=text, block=text
+        x=factor * hours, y=1e3 * value, low=1e3 * low, high=1e3 * high, hover=text, block=text
     )
 
 

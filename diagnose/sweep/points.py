@@ -76,6 +76,6 @@ def _mark(sweep: Sweep, row: Row, i: int) -> Mark:
         y=mean,
         low=mean - scatter,
         high=mean + scatter,
-        told="\n".join(lines),
+        hover="\n".join(lines),
         block=f"# {sweep.plan.name}\n{block_of(changes)}\n# {lines[-1]}",
     )

@@ -1,4 +1,4 @@
-"""Train, evaluate and report, one call each, and the demonstration of all three.
+"""Train, evaluate and report, one call each, and a demonstration of all three.
 
 It may import ``sim.output``, ``datasets.file``, ``datasets.measured``, ``datasets.generation``,
 ``diagnose.pages``, ``diagnose.feature_rows``, ``diagnose.healthy_reference``,

@@ -1,4 +1,4 @@
-"""The main job, small: from a recipe to a report, all simulated."""
+"""The whole workflow on a small simulated example: from a recipe to a report."""
 
 import time
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from ..wear_model.train import train_model
 
 RECIPE = "bilge-pump-small"
 MARKER = ".wearstate-demo"
-"""File that says that a folder is a demo's own, and its files may be replaced."""
+"""File that marks a demo's folder, whose files may be replaced."""
 
 FILES = {"data": "data.h5", "model": "model.wsm", "report": "report.html"}
 
@@ -40,15 +40,16 @@ def run_demo(
     Parameters
     ----------
     folder : Path
-        Created if needed; must be empty or an earlier demo's, whose three files are replaced.
+        Folder, created if needed; must be empty or an earlier demo's, whose three files are
+        replaced.
     seed : int
-        Of the data set and of the split.
+        Seed of the data set and of the split.
     jobs : int
         Worker processes.
     progress : callable, optional
         Called with (records done, records).
     say : callable
-        Receives one line before each stage.
+        Called with one line before each stage.
 
     Returns
     -------
@@ -59,7 +60,7 @@ def run_demo(
     Raises
     ------
     DataError
-        The folder cannot be made or written to, or holds files of someone else.
+        If the folder cannot be made or written, or holds other files.
     """
     _claim(folder)
     files = {key: folder / name for key, name in FILES.items()}
@@ -85,18 +86,18 @@ def run_demo(
 
 
 def _claim(folder: Path) -> None:
-    """Make the folder a demo's own, unless it holds other files."""
+    """Mark the folder as a demo's, unless it holds other files."""
     marker = folder / MARKER
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not marker.is_file() and any(folder.iterdir()):
             raise DataError(
-                f"{folder} holds files and is no earlier demo's, must be new or empty; choose "
+                f"{folder} holds files and is not an earlier demo's, must be new or empty; choose "
                 "another folder"
             )
         marker.touch()
     except OSError as error:
-        raise DataError(f"{folder} cannot be made a folder ({error}); choose another") from error
+        raise DataError(f"{folder} cannot be made ({error}); choose another") from error
 
 
 def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, Any]:
@@ -119,7 +120,7 @@ def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, An
 
 
 def _most_worn(rows: NDArray[np.intp], severity: NDArray[np.float64], limit: float) -> int:
-    """The most worn of some records that is not yet condemned; where all are, the least worn."""
+    """The most worn record that is not yet condemned; if all are, the least worn."""
     good = rows[severity[rows] < limit]
     if good.size:
         return int(good[np.argmax(severity[good])])
@@ -127,7 +128,7 @@ def _most_worn(rows: NDArray[np.intp], severity: NDArray[np.float64], limit: flo
 
 
 class _Clock:
-    """Seconds of each stage."""
+    """Duration of each stage [s]."""
 
     def __init__(self) -> None:
         self.laps: dict[str, float] = {}

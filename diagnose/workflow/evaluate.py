@@ -1,4 +1,4 @@
-"""From a wear model and a labelled data set to its errors on machines that it has not seen."""
+"""From a wear model and a labelled data set to its errors on unseen machines."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ from ..wear_model.file import load_model
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Evaluation:
-    """Errors and coverage of a model on a data set, of :func:`wearstate.evaluate`.
+    """Errors and coverage of a model on a data set, from :func:`wearstate.evaluate`.
 
     Attributes
     ----------
     model : WearModel
-        What was judged.
+        Model that was judged.
     data : Path
         Labelled data set.
     result : dict
         Errors, coverage, baselines; see :func:`wearstate.diagnose.evaluation.evaluate.score`.
     seed : int
-        Of the resamples.
+        Seed of the resamples.
     """
 
     model: WearModel
@@ -40,7 +40,7 @@ class Evaluation:
 
     @property
     def text(self) -> str:
-        """What ``wearstate evaluate`` prints."""
+        """Text as printed by ``wearstate evaluate``."""
         return "\n".join(score_lines(self.result, self.model.card))
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
@@ -56,7 +56,7 @@ class Evaluation:
         Raises
         ------
         DataError
-            The file exists, or its folder does not.
+            If the file exists, or its folder does not.
         """
         file = Path(path).absolute()
         refuse_output(file, force)
@@ -89,28 +89,28 @@ def evaluate(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Evaluation:
-    """Judge a wear model on machines that it has not seen, beside baselines.
+    """Judge a wear model on unseen machines, in comparison with baselines.
 
     Parameters
     ----------
     model : WearModel, str or Path
         A model or its file.
     data : str or Path
-        Labelled data set. Where it is the training set, only what was held out is used.
+        Labelled data set. If it is the training set, only the held-out part is used.
     trained_on : str or Path, optional
         Training set of the model, for the baselines.
     baseline : str or Path, optional
         Healthy records of the same machines, for a model that needs them.
     split : str, optional
-        A split that the data set holds: all of its test side is judged.
+        Split stored in the data set: its whole test side is judged.
     joined : sequence of str
         ``NAME=FILE`` of data sets that complete the records, as the model needs them.
     quick : bool
-        Leave out the baselines that need packages of others.
+        Leave out the baselines that need third-party packages.
     cache : Path, optional
-        Folder in which features of such packages are kept.
+        Folder for features computed by such packages.
     seed : int
-        Of the resamples, and of the baselines.
+        Seed of the resamples, and of the baselines.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -119,14 +119,14 @@ def evaluate(
     Returns
     -------
     Evaluation
-        Its ``result`` is a mapping, ``text`` what the command prints.
+        Its ``result`` is a mapping, ``text`` the output of the command.
 
     Raises
     ------
     DataError
-        The wear is not labelled, the features are others, or no machine is unseen.
+        If the wear is not labelled, the features differ, or no machine is unseen.
     ModelError
-        The file cannot be used.
+        If the model file cannot be used.
 
     Examples
     --------

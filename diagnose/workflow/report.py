@@ -29,22 +29,22 @@ from ..wear_model.verdict import Estimate
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Report:
-    """Verdict of a model on a recording, of :func:`wearstate.report`.
+    """Verdict of a model on a recording, from :func:`wearstate.report`.
 
     Attributes
     ----------
     recording : Recording
-        What was judged.
+        Recording that was judged.
     model : WearModel
-        What judged it.
+        Model that judged it.
     estimate : Estimate
         Verdict, wear [m] with its interval, grade.
     table : dict
-        Everything that the report says, ready for JSON.
+        Full content of the report, ready for JSON.
     baseline : Baseline or None
         Healthy recordings of the machine.
     plate : Nameplate or None
-        What is known of the machine beside its signals.
+        Known machine data besides the signals.
     """
 
     recording: Recording
@@ -56,11 +56,11 @@ class Report:
 
     @property
     def text(self) -> str:
-        """What ``wearstate report`` prints."""
+        """Text as printed by ``wearstate report``."""
         return report_text(self.table)
 
     def html(self, *, interactive: bool = False) -> str:
-        """Self-contained page with pictures, and on demand with curves to zoom and measure in.
+        """Self-contained page with pictures, optionally with curves to zoom and measure.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class Report:
         Raises
         ------
         DataError
-            Bokeh is not installed for an interactive page.
+            If Bokeh is not installed for an interactive page.
         """
         return report_html(
             self.table,
@@ -96,12 +96,12 @@ class Report:
         force : bool
             Replace an existing file.
         interactive : bool
-            Add the signals as curves to zoom and measure in.
+            Add the signals as curves to zoom and measure.
 
         Raises
         ------
         DataError
-            The file exists, its folder does not, or Bokeh is not installed for an interactive
+            If the file exists, its folder does not, or Bokeh is not installed for an interactive
             page.
         """
         file = Path(path).absolute()
@@ -109,17 +109,17 @@ class Report:
         save_page(self.html(interactive=interactive), file, force=force)
 
     def plot(self, *, ax: Any = None) -> Any:
-        """Draw the estimate on the scale of grades, and below it every channel over time.
+        """Draw the estimate on the scale of grades, and every channel over time below it.
 
         Parameters
         ----------
         ax : sequence of matplotlib.axes.Axes, optional
-            One for the estimate and one for each channel; a new figure by default.
+            Axes for the estimate and for each channel; a new figure by default.
 
         Returns
         -------
         numpy.ndarray of matplotlib.axes.Axes, shape (1 + n_channels,)
-            The first is empty but for the verdict where no grade is given.
+            The first shows only the verdict if no grade is given.
 
         Examples
         --------
@@ -164,14 +164,14 @@ def report(
     twin: str | Path | None = None,
     seed: int = 0,
 ) -> Report:
-    """Judge one recording: wear with an interval, grade, advice, or why there is none.
+    """Judge one recording: wear with an interval, grade and advice, or why there is none.
 
     Parameters
     ----------
     recording : Recording, str, Path, numpy.ndarray or pandas.DataFrame
-        A recording; a file that :func:`wearstate.read_recording` reads without options; an array
+        Recording; file that :func:`wearstate.read_recording` reads without options; array
         [shape=(n_channels, n_samples)] with the channels of the model in their order and units; or
-        a table with a column for each.
+        table with a column for each channel.
     model : WearModel, str or Path
         A model or its file.
     fs : float, optional
@@ -181,27 +181,28 @@ def report(
     scene : str, optional
         Nameplate of the machine: a built-in scene or a TOML file.
     values : mapping, optional
-        Dotted path -> value that replaces the nameplate's, as ``{"load.static": "4 kN +- 5 %"}``.
+        Values by dotted path that replace the nameplate's, as ``{"load.static": "4 kN +- 5 %"}``.
     machine : str, optional
         Kind of machine, for its ISO zone.
     twin : str or Path, optional
-        Calibrated scene of this machine, of :func:`wearstate.calibrate`: it tells the wear as well,
-        by simulation.
+        Calibrated scene of this machine, from :func:`wearstate.calibrate`, which gives a second
+        wear estimate by simulation.
     seed : int
-        Of the twin's draws, >= 0.
+        Seed of the twin's draws, >= 0.
 
     Returns
     -------
     Report
-        Its ``estimate`` holds the numbers, ``text`` what the command prints, ``save`` the page.
+        Its ``estimate`` holds the numbers, ``text`` is the output of the command, ``save`` writes
+        the page.
 
     Raises
     ------
     DataError
-        The recording cannot be read or turned into features, an array has no rate or other channels
-        than the model, or there is no such kind of machine.
+        If the recording cannot be read or turned into features, an array has no rate or other
+        channels than the model, or there is no such kind of machine.
     ModelError
-        The file cannot be used.
+        If the model file cannot be used.
     TypeError
         If recording and model are swapped.
 
@@ -246,7 +247,7 @@ def judged(
     twin: TwinOpinion | None = None,
     files: Mapping[str, Path] | None,
 ) -> Report:
-    """Report on a recording with what is known of its machine, all of it read."""
+    """Report on a recording with known machine data, all of it already read."""
     baseline = baselines.of(recording) if baselines else None
     estimate = model.estimate(
         corrected_recording(recording, plate, baseline),
@@ -274,5 +275,5 @@ def judged(
 
 
 def _also_contradicted(estimate: Estimate, said: Mapping[str, Any]) -> Estimate:
-    """The estimate with what film equilibrium and twin put before its cautions."""
+    """The estimate with the contradictions of film equilibrium and twin before its cautions."""
     return replace(estimate, verdict=said["verdict"], cautions=tuple(said["cautions"]))

@@ -34,30 +34,30 @@ def train(
     Parameters
     ----------
     data : str or Path
-        File of :func:`wearstate.generate` or :func:`wearstate.import_recordings`, with a wear
+        File from :func:`wearstate.generate` or :func:`wearstate.import_recordings`, with a wear
         label [m].
     target : str, optional
         Column of the wear; the first one of the data set by default.
     held_out : float
-        Share of the machine draws kept out of every fit, to judge the model on, >= 0 and < 1.
+        Share of the machine draws kept out of every fit to judge the model, >= 0 and < 1.
     split : str, optional
-        A split that the data set holds, in place of `held_out`: only its training side is used.
+        Split stored in the data set, in place of `held_out`: only its training side is used.
     baseline : str or Path, optional
-        Data set of healthy records of the same machines: the model is then told how each was when
-        new, and needs that of every machine it is asked about.
+        Data set of healthy records of the same machines: the model then compares each machine with
+        its new state, and needs healthy records of every machine that it judges.
     refuse : sequence of str or Path
-        Data sets that the model must refuse, as `data` but without its kind of machine: another
-        regime of lubrication, another fault, another machine. One kind each, or one for each regime
-        that a set draws; at least 20 recordings of a kind.
+        Data sets that the model must refuse, like `data` but of other kinds: another lubrication
+        regime, another fault, another machine. One kind each, or one for each regime that a set
+        draws; at least 20 recordings of a kind.
     features : sequence of str
-        Sets of features (standard, core, complete) or names; of several, folds choose. The
-        standard set by default.
+        Feature sets (standard, core, complete) or names; among several, cross-validation chooses.
+        The standard set by default.
     budget_ms : float, optional
-        Time that a prediction may take, beside its features [ms]; 5 by default.
+        Largest time of a prediction, without its features [ms]; 5 by default.
     joined : sequence of str
-        ``NAME=FILE`` of data sets that complete each record by other tests of the same machine.
+        ``NAME=FILE`` of data sets that add other tests of the same machine to each record.
     seed : int
-        Of the split, the folds and the trees.
+        Seed of the split, the folds and the trees.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -66,14 +66,14 @@ def train(
     Returns
     -------
     WearModel
-        Fitted; :func:`wearstate.save_model` writes it, :func:`wearstate.evaluate` judges it.
+        Fitted model; :func:`wearstate.save_model` writes it, :func:`wearstate.evaluate` judges it.
 
     Raises
     ------
     DataError
-        No such column or split, no limits, too few machine draws, machines unknown or without a
-        healthy record, a budget that no model keeps, or recordings to refuse that have other
-        channels or are not told from the rest.
+        If there is no such column or split, there are no limits, too few machine draws, machines
+        unknown or without a healthy record, a budget that no model meets, or recordings to refuse
+        that have other channels or cannot be distinguished from the rest.
 
     Examples
     --------
@@ -114,14 +114,14 @@ def train_classes(
     Parameters
     ----------
     data : str or Path
-        File of :func:`wearstate.generate` or :func:`wearstate.import_recordings`, with a label of
-        texts. Its groups (files, unless others were named) decide every split.
+        File from :func:`wearstate.generate` or :func:`wearstate.import_recordings`, with a text
+        label. Its groups (by default files) determine every split.
     target : str
         Column of the label.
     features : sequence of str
-        One set of features (standard, core, complete), or names; the standard set by default.
+        One feature set (standard, core, complete), or names; the standard set by default.
     seed : int
-        Of folds, trees and resamples.
+        Seed of folds, trees and resamples.
     jobs : int
         Worker processes for the features.
     progress : callable, optional

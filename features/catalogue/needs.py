@@ -234,7 +234,7 @@ def _probes(layout: Layout) -> str:
 def _cylinder(layout: Layout) -> str:
     if layout.pressures:
         return ""
-    return f"cylinder pressures = 0 must be >= 1 beside a vibration; {_declared('Pa')}"
+    return f"cylinder pressures = 0 must be >= 1 besides a vibration; {_declared('Pa')}"
 
 
 def _force(layout: Layout) -> str:
@@ -242,7 +242,7 @@ def _force(layout: Layout) -> str:
     if count == 0:
         return f"force channels = 0 must be >= 1; {_declared('N')}"
     if len(layout.vibrations) == count:
-        return "responses = 0 must be >= 1; record one beside the force"
+        return "responses = 0 must be >= 1; record one besides the force"
     try:
         low, high = layout.settings.frf_band(layout.fs)
     except ValueError as error:
@@ -387,7 +387,7 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
         "envelope": Need(text="band of eight lines", fault=_envelope),
         "frames": Need(text="256 samples", fault=_samples(256)),
         "cycles": Need(text="768 samples", fault=_samples(768)),
-        "cylinder": Need(text="pressure channel beside a vibration", fault=_cylinder),
+        "cylinder": Need(text="pressure channel besides a vibration", fault=_cylinder),
         "force": Need(text="force channel", fault=_force),
         "frf bands": Need(text="rate for its bands", fault=_frf_bands),
         "profile": Need(text="rate for its narrow bands", fault=_profile),

@@ -417,8 +417,13 @@ def feature_row(
     [1000.0, -3.01]
     """
     if isinstance(vibration, Recorded):
-        told = {"fs": fs, "tacho": tacho, "channel_names": channel_names, "quantities": quantities}
-        if given := [name for name, value in told.items() if value is not None]:
+        arguments = {
+            "fs": fs,
+            "tacho": tacho,
+            "channel_names": channel_names,
+            "quantities": quantities,
+        }
+        if given := [name for name, value in arguments.items() if value is not None]:
             raise ValueError(f"{', '.join(given)} must be left out; the recording has its own")
         return feature_row(
             vibration.vibration,

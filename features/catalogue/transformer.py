@@ -144,10 +144,10 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         return self
 
     def _fit_recordings(self, recordings: Sequence[Recorded]) -> Self:
-        told = {
+        arguments = {
             name: getattr(self, name) for name in ("fs", "channel_names", "quantities", "tacho")
         }
-        if given := [name for name, value in told.items() if value is not None]:
+        if given := [name for name, value in arguments.items() if value is not None]:
             raise ValueError(f"{', '.join(given)} must be left out; the recordings have their own")
         first = recordings[0]
         self.layout_ = _layout(first)

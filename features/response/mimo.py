@@ -147,9 +147,9 @@ def multiple_h1(
 def _partial(value: Complex, forces: Complex, noise: Float) -> Float:
     """Partial coherences (n_lines, n_channels, n_forces) of functions of unit-power forces."""
     inverse = np.diagonal(np.linalg.inv(forces), axis1=-2, axis2=-1).real
-    told = np.square(value.real) + np.square(value.imag)
-    whole = told + noise[..., np.newaxis] * inverse[:, np.newaxis]
-    share: Float = np.divide(told, whole, out=np.zeros_like(whole), where=whole > 0)
+    explained = np.square(value.real) + np.square(value.imag)
+    whole = explained + noise[..., np.newaxis] * inverse[:, np.newaxis]
+    share: Float = np.divide(explained, whole, out=np.zeros_like(whole), where=whole > 0)
     return share
 
 

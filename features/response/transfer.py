@@ -510,8 +510,8 @@ def profile(transfer: Transfer, edges: ArrayLike) -> tuple[Float, NDArray[np.boo
 
     least = _LEAST_NOISE * mean(raw)[:, band]
     sure = _ratio(np.ones(1), noise + least)
-    told = np.maximum(_ratio(mean(sure * power), mean(sure)), 0.0)[:, band]
-    weight = _ratio(told, told + noise)
+    signal = np.maximum(_ratio(mean(sure * power), mean(sure)), 0.0)[:, band]
+    weight = _ratio(signal, signal + noise)
     level = _ratio(mean(weight * power), mean(weight))
     heard = (mean(sure * raw) > _noise_limits(counts)) & (level > 0)
     return _filled(decibel(np.maximum(level, 0.0)), heard, np.sqrt(limits[1:] * limits[:-1])), heard
@@ -726,8 +726,8 @@ def mode_changes(
         [shift.frequency, shift.frequency_deviation, damping, shift.level.mean(axis=0), assurance],
         axis=-1,
     )
-    told = old < count
-    table[old[told]] = rows[told]
+    counted = old < count
+    table[old[counted]] = rows[counted]
     return table
 
 

@@ -420,8 +420,8 @@ def whirl(
     if size[top] == 0:
         return 0.0, 0.0
     side = 1 if size[(top + 1) % size.size] >= size[top - 1] else -1
-    beside = size[(top + side) % size.size] / size[top]
-    shift = (2 * beside - 1) / (1 + beside)  # lines, for a Hann window
+    neighbour = size[(top + side) % size.size] / size[top]
+    shift = (2 * neighbour - 1) / (1 + neighbour)  # lines, for a Hann window
     shift = min(max(shift, 0.0), 0.5)
     spacing = fs / size.size
     return float(frequency[top] + side * shift * spacing) / speed_hz, float(

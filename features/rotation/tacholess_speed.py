@@ -322,8 +322,8 @@ def _best_rival(
 ) -> tuple[float, float]:
     """Mean score and mean speed of the best path that stays clear of the given one."""
     found = grid[path][:, np.newaxis]
-    beside = np.maximum(_BESIDE, 2 * resolution / found)
-    away = np.where(np.abs(np.log(grid / found)) > beside, score, -np.inf)
+    margin = np.maximum(_BESIDE, 2 * resolution / found)
+    away = np.where(np.abs(np.log(grid / found)) > margin, score, -np.inf)
     if not np.all(np.isfinite(away).any(axis=1)):
         return 0.0, math.nan
     other, total = _best_path(away, reach)
@@ -416,8 +416,8 @@ def _own_estimates(power: Float, ratio: Float, expected: Float) -> tuple[Float, 
     at = np.argmax(near, axis=1)
     peak = middle + around[at]
     # Amplitudes one resolved line to either side over the peak's: each gives the shift of a tone.
-    beside = power[np.stack((peak - _PADDING, peak + _PADDING))]
-    alpha = np.sqrt(beside / np.maximum(power[peak], np.finfo(float).tiny))
+    sides = power[np.stack((peak - _PADDING, peak + _PADDING))]
+    alpha = np.sqrt(sides / np.maximum(power[peak], np.finfo(float).tiny))
     below, above = (2 * alpha - 1) / (1 + alpha)
     inner = (at > 0) & (at < around.size - 1)
     return peak + _PADDING * (above - below) / 2, np.where(inner, ratio[peak], 0.0)

@@ -548,8 +548,8 @@ def _between_lines(size: Float, top: int) -> float:
     if size[top] == 0 or top + 1 >= size.size:
         return 0.0
     side = 1 if size[top + 1] >= size[top - 1] else -1
-    beside = size[top + side] / size[top]
-    return side * float(np.clip((2 * beside - 1) / (1 + beside), 0.0, 0.5))
+    neighbour = size[top + side] / size[top]
+    return side * float(np.clip((2 * neighbour - 1) / (1 + neighbour), 0.0, 0.5))
 
 
 def envelope_span(speed_hz: float | None, bearing: BearingFrequencies | None) -> float:

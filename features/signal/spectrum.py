@@ -668,9 +668,9 @@ def strongest_tone(
     top = np.argmax(np.where(inside, lines, -1.0), axis=-1)
     below, peak, above = (_pick(lines, top + step) for step in (-1, 0, 1))
     side = np.where(above >= below, 1, -1)
-    beside = np.sqrt(np.maximum(above, below) / np.where(peak > 0, peak, 1))
+    neighbour = np.sqrt(np.maximum(above, below) / np.where(peak > 0, peak, 1))
     # A neighbour above half the peak's own amplitude pulls towards it, by half a line at most.
-    shift = np.clip((2 * beside - 1) / (1 + beside), 0, 0.5)
+    shift = np.clip((2 * neighbour - 1) / (1 + neighbour), 0, 0.5)
     amplitude = np.sqrt(2 * HANN_BANDWIDTH * peak) * _hann_loss(shift)
     place = (top + side * shift) * frequency[1]
     return np.where(peak == 0, 0.0, place), np.asarray(amplitude)
