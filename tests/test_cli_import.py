@@ -102,7 +102,7 @@ def test_twins_and_records_without_pulses_are_said(wavs, tmp_path):
     options = ("--channels", "x,y,key", "--unit", "g", "--tacho", "key", "--segment", 1)
     text = run("import", *wavs, twin, "-o", tmp_path / "x.h5", *options).stdout
     assert "one.wav and twin.wav hold the same record" in text
-    assert "2 with status no_tacho_pulses, which features leaves out" in text
+    assert "2 with status no_tacho_pulses, left out of features" in text
 
 
 def test_raw_and_text_layouts(tmp_path):

@@ -528,8 +528,8 @@ def test_the_command_judges_by_splits(trained, small_set, tmp_path, known_featur
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--retrain", "speed", "--trained-on", "x.h5"], "--trained-on and --split have no"),
-        (["--retrain", "speed", "--split", "machine"], "--trained-on and --split have no"),
+        (["--retrain", "speed", "--trained-on", "x.h5"], "--trained-on and --split do not apply"),
+        (["--retrain", "speed", "--split", "machine"], "--trained-on and --split do not apply"),
         (["-o", "page.txt"], "suffix"),
         (["--across-fidelity", "--quick"], "makes its own data"),
     ],

@@ -58,7 +58,7 @@ def test_info_lets_explicit_options_win(folder):
     assert "sample rate = 2000 Hz must be 1000 Hz, as in p.json" in other.stderr
     assert "give --resample-to 1000" in other.stderr
     slow = run("info", folder / "x.npy", *like, "--fs", "500", code=2)
-    assert "a higher rate adds no band to samples that are there" in slow.stderr
+    assert "resampling upwards adds no bandwidth" in slow.stderr
     assert "resample" not in slow.stderr
     resampled = run("info", folder / "x.npy", *like, "--fs", "2000", "--resample-to", "1000")
     assert json.loads(resampled.stdout)["sample_rate_hz"] == 1000.0
