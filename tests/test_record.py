@@ -302,7 +302,9 @@ def test_files_of_others_are_refused(tmp_path):
         DataSet(other)
     measured = tmp_path / "pump.wav"
     measured.write_bytes(b"RIFF and so on")
-    told = r"pump\.wav is not a data set; .*: wearstate import pump\.wav -o data\.h5, with their units"
+    told = (
+        r"pump\.wav is not a data set; .*: wearstate import pump\.wav -o data\.h5, with their units"
+    )
     with pytest.raises(DataError, match=told):
         DataSet(measured)
     with pytest.raises(DataError, match=r"absent\.h5: no such file; check the path"):
