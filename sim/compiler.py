@@ -375,5 +375,5 @@ class _Kept:
         if _address(function) is None or not lasting(types, function) or function.__closure__:
             return None
         code = hashlib.sha256(function.__code__.co_code).hexdigest()
-        told = f"{function.__qualname__} {types} {codegen.magic_tuple()} {code}"
-        return hashlib.sha256(told.encode()).hexdigest()[:32]
+        key = f"{function.__qualname__} {types} {codegen.magic_tuple()} {code}"
+        return hashlib.sha256(key.encode()).hexdigest()[:32]

@@ -619,4 +619,4 @@ def test_of_very_many_faults_the_first_are_told():
     with pytest.raises(SceneError) as error:
         scene_from_table(table)
     assert len(error.value.faults) == MOST_FAULTS + 1
-    assert error.value.faults[-1] == f"and {5000 - MOST_FAULTS} more; mend these first"
+    assert error.value.faults[-1] == f"and {5000 - MOST_FAULTS} more; correct these first"

@@ -274,10 +274,10 @@ def _contact_rows(
         gap = 4 * n + 2 * c * p + j
         force = _spread(response.loads[j, 1:], n, p, c, size) / unit
         dead = response.loads[j, 0] / unit
-        carries, apart = force * unit / response.whole, np.zeros(size)
+        carries, no_gap = force * unit / response.whole, np.zeros(size)
         carries[gap + p] = -1.0
-        apart[gap], apart[gap + p] = 1 / response.widest, 1.0
-        rows += [-force, carries, apart]
+        no_gap[gap], no_gap[gap + p] = 1 / response.widest, 1.0
+        rows += [-force, carries, no_gap]
         bounds += [dead, -dead * unit / response.whole, 1.0]
     return rows, bounds
 
@@ -353,11 +353,11 @@ def even_moves(
     line: AlignmentLine, before: Sequence[LineState], seconds: float
 ) -> MoveSolution | None:
     """Moves that keep every limit with reactions nearest to their mean, or None."""
-    programme, apart = _evening(programme_of(line, before, elastic=False))
-    settled, best = optimum_of(programme, apart, seconds)
+    programme, cost = _evening(programme_of(line, before, elastic=False))
+    settled, best = optimum_of(programme, cost, seconds)
     if best is None:
         return None
-    return _smallest(_capped(settled, apart, best.fun * (1 + _EVEN) + _RESERVE), seconds)
+    return _smallest(_capped(settled, cost, best.fun * (1 + _EVEN) + _RESERVE), seconds)
 
 
 def _evening(programme: MoveProgramme) -> tuple[MoveProgramme, Vector]:

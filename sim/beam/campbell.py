@@ -37,7 +37,7 @@ class Campbell(Vibrations):
     shapes : numpy.ndarray [shape=(n_speeds, n_dof, n_modes)]
         As in :class:`RotorModes`; NaN likewise.
     axis_ratio : numpy.ndarray [shape=(n_speeds, n_nodes, n_modes)]
-        Of the orbits, as in :class:`RotorModes`; NaN likewise.
+        Axis ratios of the orbits, as in :class:`RotorModes`; NaN likewise.
     mac : numpy.ndarray [shape=(n_speeds, n_modes)]
         Least MAC with the shape of the last step, 1 for the same; the first row is 1.
     lost_at : numpy.ndarray [shape=(n_modes,)]

@@ -387,10 +387,10 @@ def _parted(rotor: Rotor, speed: float, values: Complex, shapes: Complex) -> Com
     parted = shapes.copy()
     first = 0
     for last in range(1, values.size + 1):
-        apart = last == values.size or abs(values[last] - values[first]) > EQUAL * abs(
+        distinct = last == values.size or abs(values[last] - values[first]) > EQUAL * abs(
             values[first]
         )
-        if not apart:
+        if not distinct:
             continue
         if last - first > 1 and (speed == 0 or values[first] != 0):
             group = shapes[:, first:last]

@@ -180,7 +180,7 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
     exact = found.rung == "direct" and found.geometry.inlet_fill == 1
     own = coefficients(found, method="analytic" if exact else "displacement").per_load(load)
     geometry = found.geometry
-    told = Whirl(
+    result = Whirl(
         threshold=stability(own),
         coefficients=own,
         stiffness_error=math.nan,
@@ -190,7 +190,7 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
         n_z=geometry.n_z,
     )
     place = found.position
-    while exact and not told.speed_error <= tolerance:
+    while exact and not result.speed_error <= tolerance:
         geometry = doubled(geometry)
         finer = equilibrium(
             geometry, found.load, tilt=found.tilt, start=place, raise_on_failure=False
@@ -198,10 +198,10 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
         if not finer.status.ok:
             break
         fine, place = coefficients(finer).per_load(load), finer.position
-        told, own = _extrapolated(own, fine, geometry), fine
+        result, own = _extrapolated(own, fine, geometry), fine
         if 2 * geometry.n_theta > _FINEST[0] or 2 * geometry.n_z - 1 > _FINEST[1]:
             break
-    return told
+    return result
 
 
 def doubled(geometry: FilmGeometry) -> FilmGeometry:

@@ -145,8 +145,8 @@ def normal_force(
     """
     elastic = elastic_force(penetration, contact)
     spring = elastic if penetration > 0.0 else contact.stiffness * penetration
-    told = impact_speed if contact.law == LAW_HYSTERESIS else 0.0
-    floor = max(told, contact.speed_floor)
+    speed = impact_speed if contact.law == LAW_HYSTERESIS else 0.0
+    floor = max(speed, contact.speed_floor)
     loss = contact.hysteresis * approach_speed / (floor if floor > 0.0 else 1.0)
     force: float = (
         spring + contact.damping * approach_speed

@@ -185,15 +185,15 @@ def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> 
     """
     speed = float(scene.drive.speed)  # type: ignore[attr-defined]
     full = min(turns / speed, scene.duration)
-    dear = cost_of(with_values(scene, {"duration": full}))
-    duration = max(1.01 / speed, full * min(1.0, seconds / dear))
+    cost = cost_of(with_values(scene, {"duration": full}))
+    duration = max(1.01 / speed, full * min(1.0, seconds / cost))
     short = with_values(scene, {"duration": duration, "fidelity": "given"})
     solution = simulate(short, seed=0, truth=truth, raise_on_failure=False)
     of_scene = scene_doubts(short)
     doubts = solution_doubts(short, solution)[len(of_scene) :] if solution.status.ok else ()
     known = {doubt.text for doubt in (*of_scene, *doubts)}
-    told = tuple(text for text in solution.warnings if text not in known)
-    return ShortRun(scene=short, solution=solution, warnings=told, doubts=doubts)
+    shown = tuple(text for text in solution.warnings if text not in known)
+    return ShortRun(scene=short, solution=solution, warnings=shown, doubts=doubts)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -317,12 +317,12 @@ def _blows(part: Exciter, duration: float, rng: np.random.Generator) -> list[_Bl
     peaks = part.force * rng.lognormal(0.0, part.peak_scatter, count)
     angles = part.angle_scatter * rng.standard_normal(count)
     width = part.place_scatter if isinstance(part, PlacedExciter) else 0.0
-    beside = width * rng.standard_normal(count)
+    offset = width * rng.standard_normal(count)
     twice = rng.uniform(size=count) < part.double_hits
     delays = rng.uniform(*_REBOUND_AFTER, count) + part.contact_time
     smaller = rng.uniform(*_REBOUND_PEAK, count)
-    first = np.stack([begins, peaks, angles, beside], axis=1)
-    second = np.stack([begins + delays, peaks * smaller, angles, beside], axis=1)[twice]
+    first = np.stack([begins, peaks, angles, offset], axis=1)
+    second = np.stack([begins + delays, peaks * smaller, angles, offset], axis=1)[twice]
     return [_Blow(*map(float, row)) for row in np.concatenate([first, second])]
 
 

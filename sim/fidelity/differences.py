@@ -136,11 +136,11 @@ def _difference(
     kind, scale = reference[0][name][1:]
     own = np.array([each[name][0] for each in candidate])
     other = np.array([each[name][0] for each in reference])
-    apart = (own - other) * _unit(kind, scale, float(np.mean(other)))
-    if len(apart) < 2:
-        return Difference(mean=float(apart[0]), standard_error=math.inf)
-    spread = float(np.std(apart, ddof=1)) / math.sqrt(len(apart))
-    return Difference(mean=float(np.mean(apart)), standard_error=spread)
+    deviations = (own - other) * _unit(kind, scale, float(np.mean(other)))
+    if len(deviations) < 2:
+        return Difference(mean=float(deviations[0]), standard_error=math.inf)
+    spread = float(np.std(deviations, ddof=1)) / math.sqrt(len(deviations))
+    return Difference(mean=float(np.mean(deviations)), standard_error=spread)
 
 
 def _unit(kind: str, scale: float, size: float) -> float:

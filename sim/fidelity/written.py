@@ -66,6 +66,6 @@ def ladder(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
     written = written_rung(effect, scene)
     if written.name not in [rung.name for rung in rungs]:
         own = cost_of(scene)
-        dearer = (i for i, r in enumerate(rungs) if cost_of(with_values(scene, r.values)) > own)
-        rungs.insert(next(dearer, len(rungs)), written)
+        costlier = (i for i, r in enumerate(rungs) if cost_of(with_values(scene, r.values)) > own)
+        rungs.insert(next(costlier, len(rungs)), written)
     return tuple(rungs)

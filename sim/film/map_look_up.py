@@ -222,9 +222,9 @@ def map_place(
 ) -> Any:
     """See :class:`MapPlace`; `roots` and `angles` are the numbers of coefficients."""
     eccentricity = math.sqrt(x * x + y * y)
-    apart = eccentricity > 0.0
-    distance = eccentricity if apart else 1.0
-    n_x, n_y = x / distance if apart else 1.0, y / distance
+    off_centre = eccentricity > 0.0
+    distance = eccentricity if off_centre else 1.0
+    n_x, n_y = x / distance if off_centre else 1.0, y / distance
     root, stretch, scale = map_scales(table, eccentricity)
     along, across = v_x * n_x + v_y * n_y, (v_y * n_x - v_x * n_y) * stretch
     size = math.sqrt(along * along + across * across)

@@ -98,9 +98,9 @@ def short_resistance(
     (-0.4444, 0.6046)
     """
     eccentricity = math.sqrt(x * x + y * y)
-    apart = eccentricity > 0.0
-    distance = eccentricity if apart else 1.0
-    n_x, n_y = x / distance if apart else 1.0, y / distance
+    off_centre = eccentricity > 0.0
+    distance = eccentricity if off_centre else 1.0
+    n_x, n_y = x / distance if off_centre else 1.0, y / distance
     rest = 1.0 - eccentricity * eccentricity
     root = math.sqrt(rest)
     w_r = v_x * n_x + v_y * n_y

@@ -173,15 +173,15 @@ def _reach(work: DirectFilm, i: int, j: int, way: int) -> float:
         short = work.pressure[place, j + 1] == 0.0 and inflow < 0.5 * taken
         return inflow / taken if short else -1.0
     while cells < n and work.state[place, j] == CAVITATED:
-        beside = _inflow_beside(work, place, j)
-        if cells > 0 and beside == 0.0:
+        sideways = _inflow_beside(work, place, j)
+        if cells > 0 and sideways == 0.0:
             break
         cells += 1
         place = (place + way) % n
         if work.state[place, j] == PRESSURISED:
-            inflow += 0.5 * beside  # the other half goes to the film behind the gap
+            inflow += 0.5 * sideways  # the other half goes to the film behind the gap
             break
-        inflow += beside
+        inflow += sideways
     place = i
     for filled in range(cells):
         place = (place + way) % n
@@ -343,7 +343,7 @@ def _face_gap(
 
 
 def _outflow(along: Vector, across: Vector, pressure: Vector) -> Vector:
-    """A P with P at the unknown nodes and one beside them (n, m + 2)."""
+    """A P with P at the unknown nodes and those next to them (n, m + 2)."""
     own = pressure[:, 1:-1]
     to_next = along * (own - np.roll(own, -1, axis=0))
     to_side = across * np.diff(-pressure, axis=1)

@@ -84,7 +84,7 @@ class Groove:
     angle, width : float
         Middle and extent along the circumference [rad].
     length_share : float
-        Of the bearing's length, in (0, 1].
+        Share of the bearing's length, in (0, 1].
     pressure : float
         Non-dimensional feed pressure P >= 0.
     """

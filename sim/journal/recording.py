@@ -303,8 +303,8 @@ def _load_rows(scene: JournalScene) -> Float:
     """Rows of a load record: time [s] from the first sample, forces along X and Y [N]."""
     record = scene.load.record
     assert record is not None  # checked with the scene
-    beside = Path(record.folder) / record.file
-    path = beside if beside.is_file() else Path(record.file)
+    at_scene = Path(record.folder) / record.file
+    path = at_scene if at_scene.is_file() else Path(record.file)
     try:
         rows = np.loadtxt(path, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:

@@ -35,9 +35,9 @@ def orbit_faults(scene: Scene) -> list[str]:
     """
     journal = cast(JournalScene, scene)
     faults = []
-    speed, told = math.tau * journal.drive.speed, journal.numerics.step
+    speed, given = math.tau * journal.drive.speed, journal.numerics.step
     longest = _LONGEST_STEP.get(journal.numerics.integrator, math.inf)
-    step = min(told or JOURNAL_STEP / speed, 1 / journal.sample_rate)
+    step = min(given or JOURNAL_STEP / speed, 1 / journal.sample_rate)
     if step * speed > longest:
         faults.append(
             f"numerics.step = {step:g} s must be <= {longest / speed:.3g} s, {longest:g} rad of "

@@ -124,9 +124,9 @@ def film_pull(
     wall = o.wall_damping + o.relaxing
     pull_x, pull_y = spring * yield_x + wall * u_x, spring * yield_y + wall * u_y
     distance = math.sqrt(s_x * s_x + s_y * s_y)
-    apart = distance > 0.0
-    over = distance if apart else 1.0
-    n_x, n_y = s_x / over if apart else 1.0, s_y / over
+    off_centre = distance > 0.0
+    over = distance if off_centre else 1.0
+    n_x, n_y = s_x / over if off_centre else 1.0, s_y / over
     most = 1.0 - max(1.0 - DEEPEST, o.roughness / c.clearance)  # asperities keep the surfaces apart
     share = min(1.0 / c.clearance, most / over)
     return FilmPull(

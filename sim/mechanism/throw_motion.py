@@ -112,9 +112,9 @@ def slot_moment(pin: Any, along: float, sin_b: float, cos_b: float) -> Any:
 def polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
     """Length, its rate, and direction; a centred pin gets the stroke's direction, not NaN."""
     distance = math.sqrt(d_x * d_x + d_y * d_y)
-    apart = distance > 0.0
-    inverse = 1.0 / (distance if apart else 1.0)
-    n_x, n_y = d_x * inverse if apart else 1.0, d_y * inverse
+    off_centre = distance > 0.0
+    inverse = 1.0 / (distance if off_centre else 1.0)
+    n_x, n_y = d_x * inverse if off_centre else 1.0, d_y * inverse
     return distance, v_x * n_x + v_y * n_y, n_x, n_y
 
 
@@ -249,8 +249,8 @@ def guide_end(
     drag = -sliding if touching else 0.0
     own = margin(overlap, force, touching, c)
     away, leaving = at_upper if lower else at_lower, speed_u if lower else speed_l
-    apart = c.stiffness * away + c.damping * leaving if c.law == LAW_KELVIN_VOIGT else 0.0
-    other = margin(away, apart, False, c)
+    open_force = c.stiffness * away + c.damping * leaving if c.law == LAW_KELVIN_VOIGT else 0.0
+    other = margin(away, open_force, False, c)
     upper = Touch(law, at_upper, other if lower else own, speed_u)
     return (
         drag,

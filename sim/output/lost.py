@@ -9,7 +9,7 @@ LONG = 64
 """Least length of a stretch in samples: loggers lose whole blocks."""
 
 _CUT_OFF = 4  # steps of the converter: a signal that comes to rest ends in small steps
-_APART = 0.02  # of the swing: an extreme of the signal itself has close samples next to it
+_CLOSE = 0.02  # of the swing: an extreme of the signal itself has close samples next to it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,5 +82,5 @@ def lost_samples(row: NDArray[np.floating]) -> LostSamples | None:
 
 def _reached(row: NDArray[np.floating], end: float) -> bool:
     """Whether a signal has values close to an extreme before it reaches it."""
-    apart = np.abs(row - end)
-    return bool(((apart > 0) & (apart <= _APART * np.ptp(row))).any())
+    distance = np.abs(row - end)
+    return bool(((distance > 0) & (distance <= _CLOSE * np.ptp(row))).any())

@@ -57,12 +57,12 @@ def simulate_pumps(
         refused.
     """
     kinds: dict[LaneKind, list[_Job]] = {}
-    told = not set(truth) - set(GATHERED_TRUTH)
-    known = _Known(whole=not told, gathered=told and bool(truth))
+    available = not set(truth) - set(GATHERED_TRUTH)
+    known = _Known(whole=not available, gathered=available and bool(truth))
     for number, (scene, seed) in enumerate(jobs):
         pump = cast(PumpScene, scene)
         try:
-            kind = _kind_of(pump) if told else None
+            kind = _kind_of(pump) if available else None
             plan = planned(pump) if kind else None
         except LimitError as error:
             yield number, refused_run(pump, error)

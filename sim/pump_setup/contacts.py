@@ -105,9 +105,9 @@ def contact_record(
     if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
         # the film has its own drag, and squeezed oil is not part of the wall
         record["tangential_damping"] = 0.0
-        told = part.oil.wall_damping
+        given = part.oil.wall_damping
         spring = tangent_stiffness(record[0], load) if stiffness else 0.0
-        record["damping"] = _WALL_DAMPING * math.sqrt(spring / mobility) if told is None else told
+        record["damping"] = _WALL_DAMPING * math.sqrt(spring / mobility) if given is None else given
         record["hysteresis"] = 0.0
     elif part.rung == "link":
         record["damping"] = _LINK_DAMPING * 2 * math.sqrt(load / max(clearance, 1e-12) / mobility)

@@ -216,7 +216,7 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
     except RecursionError:
         raise SceneError(name, ["not TOML: lists or tables nested too deep; flatten it"]) from None
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(name, [f"not TOML: {error}; mend the line it names"]) from None
+        raise SceneError(name, [f"not TOML: {error}; correct that line"]) from None
     except ValueError:  # a whole number that Python does not convert
         raise SceneError(name, [f"a whole number {_LONG_NUMBER}"]) from None
     if faults:

@@ -190,8 +190,8 @@ class Scene(Part):
     def __repr__(self) -> str:
         """Machine, name and extent of a recording."""
         rate = self.sample_rate
-        told = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
-        return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {told}>"
+        rate_text = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
+        return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {rate_text}>"
 
     __str__ = __repr__
 
@@ -320,7 +320,7 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
             for line in fault_lines(model, entry)
         ]
         if len(found) > len(entries):
-            faults.append(f"and {len(found) - len(entries)} more; mend these first")
+            faults.append(f"and {len(found) - len(entries)} more; correct these first")
         if issubclass(model, Scene) and () not in places:
             parts = _valid_parts(model, table)
             faults += model.cross_faults(parts)

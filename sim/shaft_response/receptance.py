@@ -210,12 +210,12 @@ def _node_blocks(matrix: csc_array, n_beam: int) -> tuple[Vector, Vector]:
 def _check_isotropic(blocks: Vector, name: str) -> None:
     """Raise if the planes of a node without support differ or are coupled."""
     bound = _ISOTROPY * np.abs(blocks).max(initial=0.0)
-    apart = np.abs(blocks[:, :2, :2] - blocks[:, 2:, 2:]).max(initial=0.0)
+    difference = np.abs(blocks[:, :2, :2] - blocks[:, 2:, 2:]).max(initial=0.0)
     coupled = np.abs(blocks[:, :2, 2:]).max(initial=0.0)
-    if max(apart, coupled) > bound:
+    if max(difference, coupled) > bound:
         raise ValueError(
             f"the {name} of the shaft differs between its planes, or couples them, by "
-            f"{max(apart, coupled):g} (bound {bound:g}) away from every support; "
+            f"{max(difference, coupled):g} (bound {bound:g}) away from every support; "
             "name a support there"
         )
 
