@@ -95,7 +95,7 @@ def test_table_for_people_says_before_and_after(states):
 def test_a_line_that_finds_no_rest_is_told():
     found = film_states(moved_scene(load_scene("shaft-rig"), {}, {"second": 0.02}), speeds=(1.0,))
     assert found[0].film is None
-    assert "finds no rest on its films" in resting(found)[0]
+    assert "has no equilibrium on its films" in resting(found)[0]
 
 
 # --- margins and jacks
@@ -173,4 +173,4 @@ def test_a_line_that_bends_into_its_bores_still_has_a_page(tmp_path):
     arguments = ["align", "shaft-rig", "--set", "bearings.1.slope=0.02 rad", "-o", str(page)]
     told = CliRunner().invoke(cli, arguments)
     assert told.exit_code == 0, told.output
-    assert "finds no rest on its films" in page.read_text(encoding="utf-8")
+    assert "has no equilibrium on its films" in page.read_text(encoding="utf-8")

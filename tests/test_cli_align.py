@@ -79,7 +79,7 @@ def test_what_blocks_is_named_with_what_it_would_take():
     assert "not met: bearing 'intermediate_aft', cold: reaction = 0 kN must be >= 3 kN" in text
     assert "blocked by: bearing '" in text
     assert "would have to be" in text
-    assert "no move within its bounds brings them nearer" in text
+    assert "no move within the bounds brings the limits nearer" in text
 
 
 def test_exit_codes():

@@ -1,4 +1,4 @@
-"""The alignment of a shaft line in its conditions: limits, calibration, jacking."""
+"""Alignment of a shaft line in its conditions: limits, calibration, jacking."""
 
 from dataclasses import dataclass
 
@@ -15,21 +15,21 @@ from .quiet_moves import QuietMoves, quiet_moves
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Alignment:
-    """What `wearstate align` found, before it is put in words.
+    """Result of `wearstate align`.
 
     Attributes
     ----------
     scene : ShaftScene
     line : AlignmentLine
     states : tuple of LineState
-        One for each condition, as the line is set.
+        One for each condition, with the line as set.
     calibration : Calibration or None
     jacking : Jacking or None
-        In the first condition.
+        Jacking in the first condition.
     margin : float
-        Share of each limit that was asked for as a distance from it.
+        Requested distance from each limit, as a share of it.
     quiet : QuietMoves or None
-        What the moves do to the vibration, where that was the target.
+        Effect of the moves on the vibration, if that was the target.
     """
 
     scene: ShaftScene
@@ -44,12 +44,12 @@ class Alignment:
 
     @property
     def name(self) -> str:
-        """Of the scene."""
+        """Name of the scene."""
         return self.scene.name
 
     @property
     def proposed(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Moves [m] and turns [rad] by bearing; empty where none are proposed."""
+        """Moves [m] and turns [rad] by bearing; empty if none are proposed."""
         found = self.calibration
         if found is None or not found.moved:
             return {}, {}
@@ -62,12 +62,12 @@ class Alignment:
 
     @property
     def unmet(self) -> tuple[Check, ...]:
-        """Limits that the line, as it is set, does not keep."""
+        """Limits that the line does not meet as set."""
         return tuple(limit for state in self.states for limit in check(state) if not limit.met)
 
     @property
     def verdict(self) -> str:
-        """``within``; ``alarm`` where a bearing lifts or no moves help; else ``warning``."""
+        """``within``; ``alarm`` if a bearing lifts or no moves help; else ``warning``."""
         stuck = self.calibration is not None and not self.calibration.status.ok
         if stuck or any(state.lifted for state in self.states):
             return "alarm"
@@ -84,21 +84,21 @@ def align(
     margin: float = 0.0,
     jack: str | None = None,
 ) -> Alignment:
-    """Judge the alignment of a scene, and find the moves that mend it.
+    """Judge the alignment of a scene, and find moves that correct it.
 
     Parameters
     ----------
     scene : Scene
-        Of the machine propulsion-shaft.
+        Scene of the machine propulsion-shaft.
     condition : str
-        A name of the scene's conditions, or "all".
+        Name of one of the scene's conditions, or "all".
     mend : bool
-        Look for moves.
+        Search for moves.
     prefer, target : str
-        As of :func:`wearstate.sim.alignment.calibration.calibrate`; the target "vibration" is that
+        As in :func:`wearstate.sim.alignment.calibration.calibrate`; the target "vibration" is that
         of :func:`wearstate.diagnose.alignment.quiet_moves.quiet_moves`.
     margin : float
-        As of :func:`wearstate.sim.alignment.calibration.calibrate`.
+        As in :func:`wearstate.sim.alignment.calibration.calibrate`.
     jack : str, optional
         Bearing to jack.
 
@@ -110,7 +110,7 @@ def align(
     Raises
     ------
     AlignmentError
-        The scene is no shaft line, its line cannot rest, or a name is unknown.
+        The scene is not a shaft line, its line has no equilibrium, or a name is unknown.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def align(
 def _line_of(scene: ShaftScene) -> AlignmentLine:
     try:
         return alignment_line(scene)
-    except ValueError as error:  # of the beam: stations that do not go together
+    except ValueError as error:  # from the beam: inconsistent stations
         raise AlignmentError(f"scene '{scene.name}': {error}") from None
 
 
@@ -164,6 +164,6 @@ def _conditions_of(scene: ShaftScene, name: str) -> list[Condition]:
 
 
 def states_after(found: Alignment) -> tuple[LineState, ...]:
-    """Conditions after the moves; none where nothing was moved."""
+    """Conditions after the moves; empty without moves."""
     moved = found.calibration is not None and found.calibration.moved
     return found.calibration.after if found.calibration is not None and moved else ()

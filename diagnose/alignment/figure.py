@@ -23,7 +23,7 @@ def align_figure(found: Alignment) -> Any:
     Returns
     -------
     matplotlib.figure.Figure
-        Of the first condition; reactions of all.
+        Pictures of the first condition; reactions of all conditions.
     """
     from matplotlib.figure import Figure
 
@@ -55,7 +55,7 @@ def save_figure(found: Alignment, path: Path, *, force: bool = True) -> None:
 
 
 def _drawn(found: Alignment) -> list[tuple[LineState, str, str]]:
-    """States of the first condition with label and colour: as set, and mended."""
+    """States of the first condition with label and colour: as set, and after the moves."""
     name = found.states[0].condition.name
     drawn = [(found.states[0], f"{name}, as set", _BEFORE)]
     if found.calibration is not None and found.calibration.moved:
@@ -75,7 +75,7 @@ def _draw_deflection(axes: Any, found: Alignment) -> None:
     for seat in found.line.seats:
         name, place = short_name(seat.name, 20), (seat.station, 1.02)
         axes.annotate(name, place, color=_NAMES, **_above(axes))
-    # names stand below the title
+    # leave room for names below the title
     pad = 62.0 if _is_narrow(axes) else 18.0
     _finish(axes, "height [mm]", "Shaft and bottoms of the bores", pad=pad)
 
@@ -90,7 +90,7 @@ _NAMES = "#49535e"
 
 
 def _above(axes: Any) -> dict[str, Any]:
-    """How names stand above the axes, slanted where they have no room."""
+    """Style of names above the axes, slanted if there is no room."""
     place = {"xycoords": ("data", "axes fraction"), "fontsize": 8}
     return place | ({"rotation": 35, "ha": "left"} if _is_narrow(axes) else {"ha": "center"})
 
@@ -107,7 +107,7 @@ def _draw_moment(axes: Any, found: Alignment) -> None:
 
 
 def _draw_reactions(axes: Any, found: Alignment) -> None:
-    """Bars of every condition, as set and after; dashes at the limits."""
+    """Draw bars for every condition, as set and after the moves, with dashes at the limits."""
     n, mended = len(found.line.seats), found.calibration
     pairs = [(state, _BEFORE) for state in found.states]
     if mended is not None and mended.moved:
@@ -124,7 +124,7 @@ def _draw_reactions(axes: Any, found: Alignment) -> None:
             if 0 < bound < math.inf:
                 axes.hlines(bound / 1e3, i - 0.45, i + 0.45, color=_LIMIT, ls="--", lw=1)
     highest = max(float(state.reactions.max()) for state, _ in pairs)
-    axes.set_ylim(0, 1.35 * highest / 1e3)  # limits far above it say little
+    axes.set_ylim(0, 1.35 * highest / 1e3)  # limits far above are not shown
     axes.legend(handles=_meanings(pairs), fontsize=8, loc="upper right", ncols=3)
     slant = {"rotation": 25, "ha": "right"} if _is_narrow(axes) else {}
     names = [short_name(name, 20) for name in found.line.names]
@@ -134,7 +134,7 @@ def _draw_reactions(axes: Any, found: Alignment) -> None:
 
 
 def _meanings(pairs: Sequence[tuple[LineState, str]]) -> list[Any]:
-    """What the colours of the bars and the dashes mean."""
+    """Legend of the bars and dashes."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -151,7 +151,7 @@ def _draw_jacking(axes: Any, found: Jacking) -> None:
     lift = 1e3 * found.lifts
     axes.plot(lift, found.loads / 1e3, color=_BEFORE, label=f"jack at {found.station:.3g} m")
     second = found.zero_load + found.second_slope * found.lifts
-    axes.plot(lift, second / 1e3, "--", color=_LIMIT, label="second line, drawn back")
+    axes.plot(lift, second / 1e3, "--", color=_LIMIT, label="second line, extrapolated")
     axes.plot(1e3 * found.free_lift, found.free_load / 1e3, "o", color=_AFTER, label="comes free")
     axes.set(
         xlabel="lift [mm]", ylabel="load [kN]", title=f"Jacking of {short_name(found.bearing)}"

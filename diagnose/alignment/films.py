@@ -1,4 +1,4 @@
-"""What an alignment does to the oil films of its bearings: stiffness, tilt, pressure, by speed.
+"""Effect of an alignment on the oil films of its bearings: stiffness, tilt, pressure, by speed.
 
 References
 ----------
@@ -30,23 +30,23 @@ Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 SPEEDS = (0.75, 1.0, 1.25)
-"""Of the scene's speed, at which films are shown [-]."""
+"""Speeds at which films are shown, over that of the scene [-]."""
 
 _SHOWN_PANELS = 6  # bearings of a picture
-_BAND, _LINES = (5.0, 400.0), 400  # of transfer functions that nobody measured [Hz]
+_BAND, _LINES = (5.0, 400.0), 400  # of computed transfer functions without a test [Hz]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineFilms:
-    """The films of a line as it is set, or after moves, at one speed.
+    """Films of a line as set, or after moves, at one speed.
 
     Attributes
     ----------
     after : bool
-        Whether the moves are made.
+        Whether the moves are applied.
     speed_hz : float
     film : BeamFilm or None
-        None where the line does not rest on its films.
+        None if the line has no equilibrium on its films.
     """
 
     after: bool
@@ -67,14 +67,14 @@ def film_states(
     ----------
     scene : ShaftScene
     moves, turns : mapping of str to float, optional
-        Bearing -> by how much it rises [m], and its bore turns [rad]; nothing moves by default.
+        Bearing -> upward move [m] and rotation of its bore [rad]; by default nothing moves.
     speeds : sequence of float
-        Over the scene's [-].
+        Speeds over that of the scene [-].
 
     Returns
     -------
     tuple of LineFilms
-        As set at all speeds, then after the moves, where there are any.
+        As set at all speeds, then after the moves, if any.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def film_states(
 def moved_scene(
     scene: ShaftScene, moves: Mapping[str, float], turns: Mapping[str, float]
 ) -> ShaftScene:
-    """The scene with its bearings moved and its bores turned.
+    """Scene with its bearings moved and its bores turned.
 
     Examples
     --------
@@ -168,7 +168,7 @@ _CELLS = (
 
 
 def film_cells(states: Sequence[LineFilms]) -> list[tuple[str, ...]]:
-    """Rows of a table for people: before the moves -> after them.
+    """Rows of a table as text: before the moves → after them.
 
     Examples
     --------
@@ -200,19 +200,19 @@ def _change(
 
 
 def resting(states: Sequence[LineFilms]) -> list[str]:
-    """A sentence for each state in which the line does not rest on its films."""
+    """A sentence for each state in which the line has no equilibrium on its films."""
     return [
         f"{'after the moves' if state.after else 'as set'}, {60 * state.speed_hz:.0f} 1/min: the "
-        "line finds no rest on its films"
+        "line has no equilibrium on its films"
         for state in states
         if state.film is None
     ]
 
 
 def pressure_images(states: Sequence[LineFilms]) -> list[PageImage]:
-    """Film pressure over every bearing's unrolled bore, as set beside after: a picture each.
+    """Film pressure over the unrolled bore, one picture per bearing, as set next to after moves.
 
-    The two states nearest to the scene's speed are drawn.
+    The states at the middle speed are drawn.
     """
     rows = [state for state in _at_one_speed(states) if state.film is not None]
     films = [state.film for state in rows if state.film is not None]
@@ -236,14 +236,14 @@ def _bearing_figure(rows: Sequence[LineFilms], films: Sequence[BeamFilm], i: int
 
 
 def _at_one_speed(states: Sequence[LineFilms]) -> list[LineFilms]:
-    """Those of the middle speed."""
+    """States at the middle speed."""
     speeds = sorted({state.speed_hz for state in states})
     middle = speeds[len(speeds) // 2]
     return [state for state in states if state.speed_hz == middle]
 
 
 def _draw_pressure(axes: Any, film: BeamFilm, i: int, highest: float) -> Any:
-    """Pressure over length and angle; the film's angle counts from below, with the rotation."""
+    """Draw pressure over length and angle, which counts from the bottom with the rotation."""
     pressure = np.asarray(film.films[i].pressure)
     unit = _pressure_unit(film.bearings[i].worn, film.speed)
     shifted = np.roll(pressure, pressure.shape[0] // 2, axis=0) * unit / 1e6
@@ -270,22 +270,22 @@ def transfer_images(
     *,
     measured: LineTest | None = None,
 ) -> list[PageImage]:
-    """Accelerances of the housings, each a picture: measured, as set, and after the moves.
+    """Accelerances of the housings, one picture each: measured, as set, and after the moves.
 
     Parameters
     ----------
     scene : ShaftScene
-        The line as set, or as found by its tests.
+        The line as set, or as estimated from its tests.
     moves, turns : mapping of str to float, optional
-        Proposed.
+        Proposed moves and turns.
     measured : LineTest, optional
-        Where it pushes, its responses and its lines are drawn; else the force acts on the aftmost
-        journal, up, and no coherence is drawn.
+        Test whose force, responses and lines are used; by default the force acts on the aftmost
+        journal, upward, and no coherence is drawn.
 
     Raises
     ------
     ShaftFilmError
-        The line does not rest on its films as it is set.
+        The line has no equilibrium on its films as set.
     """
     plan = _plan(scene, measured)
     curves = _curves(scene, moves or {}, turns or {}, plan)
@@ -321,7 +321,7 @@ def _draw_response(
     measured: LineTest | None,
     k: int,
 ) -> None:
-    """Level of one response over its coherence, or level alone where nothing is measured."""
+    """Draw level and coherence of one response, or only the level without a measurement."""
     level = column[0]
     if measured is not None:
         value = measured.transfer.value[:, k]
@@ -355,7 +355,7 @@ def _plan(scene: ShaftScene, measured: LineTest | None) -> _Plan:
 def _curves(
     scene: ShaftScene, moves: Mapping[str, float], turns: Mapping[str, float], plan: _Plan
 ) -> list[tuple[str, str, Complex]]:
-    """Label, colour and accelerances of the line as set and, if anything moves, after."""
+    """Label, colour and accelerances of the line as set and, if anything moves, after moves."""
     first = line_model(scene)
     line = free_line(
         first, plan.frequencies, speed=plan.speed, forces=[plan.force], responses=plan.responses

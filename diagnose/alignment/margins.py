@@ -1,4 +1,4 @@
-"""How far a line is from its limits before and after moves, and what each jack costs."""
+"""Margins of a line from its limits before and after moves, and effort of jacking."""
 
 import math
 from collections.abc import Sequence
@@ -8,11 +8,11 @@ from ...sim.alignment.alignment import Check, LineState, check, influence
 from ...sim.alignment.calibration import Calibration
 
 JACKED = 0.1e-3
-"""Rise of one bearing whose effect is told [m]."""
+"""Rise of one bearing for which the effect is given [m]."""
 
 
 def margin_of(limit: Check) -> float:
-    """Distance of a quantity from its nearest bound, over the bound; negative beyond it [-].
+    """Distance of a quantity from its nearest bound, relative to the bound, negative beyond [-].
 
     Examples
     --------
@@ -32,12 +32,12 @@ def margin_of(limit: Check) -> float:
 def margin_rows(
     before: Sequence[LineState], after: Sequence[LineState] = ()
 ) -> list[dict[str, Any]]:
-    """For each bearing the nearest of its limits in any condition, before and after moves.
+    """Nearest limit of each bearing in any condition, before and after moves.
 
     Parameters
     ----------
     before, after : sequence of LineState
-        One for each condition; `after` may be left out.
+        One for each condition; `after` may be omitted.
 
     Returns
     -------
@@ -69,25 +69,25 @@ def _nearest(states: Sequence[LineState], name: str) -> dict[str, Any] | None:
 
 
 def jack_rows(states: Sequence[LineState], found: Calibration | None) -> list[dict[str, Any]]:
-    """What it costs to jack each bearing, in the first condition.
+    """Effort and effect of jacking each bearing, in the first condition.
 
     Parameters
     ----------
     states : sequence of LineState
-        As the line is set.
+        States of the line as set.
     found : Calibration, optional
 
     Returns
     -------
     list of dict
-        ``bearing``, ``move_m`` and ``turn_rad`` as proposed, ``load_n`` that a jack there lifts,
-        ``stiffness_n_per_m`` against which it does, ``work_j`` of the move, and the bearing whose
-        reaction changes most, ``most_at``, by ``most_n`` for :data:`JACKED`.
+        ``bearing``, proposed ``move_m`` and ``turn_rad``, ``load_n`` and ``stiffness_n_per_m`` that
+        a jack there works against, ``work_j`` of the move, and the bearing with the largest change
+        of reaction, ``most_at``, by ``most_n`` for :data:`JACKED`.
 
     Notes
     -----
     The work is that of the reaction along the move with the line's own stiffness,
-    ``R u + A u^2 / 2``, negative where the bearing is lowered under its load.
+    ``R u + A u^2 / 2``, negative if the bearing is lowered under its load.
     """
     state = states[0]
     matrix = influence(state.line, state)
@@ -113,7 +113,7 @@ def jack_rows(states: Sequence[LineState], found: Calibration | None) -> list[di
 
 
 def margin_cells(rows: Sequence[dict[str, Any]]) -> list[tuple[str, str, str]]:
-    """The same for people."""
+    """Rows of :func:`margin_rows` as text."""
     return [(row["bearing"], _words(row["before"]), _words(row["after"])) for row in rows]
 
 
@@ -124,7 +124,7 @@ def _words(limit: dict[str, Any] | None) -> str:
 
 
 def jack_cells(rows: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """The same for people, in mm, kN and J."""
+    """Rows of :func:`jack_rows` as text, in mm, kN and J."""
     return [
         (
             row["bearing"],

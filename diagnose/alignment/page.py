@@ -46,17 +46,17 @@ def align_html(
     measured: SagReport | None = None,
     note: str = "",
 ) -> str:
-    """One self-contained page: verdict, tables, picture, moves, and a simulated test of them.
+    """A self-contained page: verdict, tables, pictures, moves, and a simulated test of them.
 
     Parameters
     ----------
     found : Alignment
     tested : BeforeAfter, optional
-        Of :func:`wearstate.diagnose.shaft_tests.before_after.calibrated_test`.
+        From :func:`wearstate.diagnose.shaft_tests.before_after.calibrated_test`.
     measured : SagReport, optional
-        What measured tests say; `found` is then of the line where they put it.
+        Sags from measured tests; `found` then refers to the line with these sags.
     note : str
-        Why there is no test, where one was asked for.
+        Why a requested test is missing.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def _state_cells(state: LineState) -> dict[str, Any]:
 
 
 def _tested(result: BeforeAfter) -> dict[str, Any]:
-    """A simulated test for the page: its heading, summary, picture and peaks."""
+    """A simulated test for the page: heading, summary, pictures and peaks."""
     heading, *_ = rig_text(result).splitlines()
     rows = [
         (
@@ -133,7 +133,7 @@ def _tested(result: BeforeAfter) -> dict[str, Any]:
 
 
 def _films(states: Sequence[LineFilms]) -> dict[str, Any]:
-    """Oil films for the page; without a picture where the line does not rest."""
+    """Oil films for the page; without a picture if the line has no equilibrium."""
     rests = any(state.film is not None for state in states)
     return {
         "head": FILM_HEAD,
@@ -149,7 +149,7 @@ def _transfers(
     turns: Mapping[str, float],
     measured: SagReport | None,
 ) -> list[PageImage]:
-    """Pictures of transfer functions, one for each measured test, else one of the model."""
+    """Pictures of transfer functions, for each measured test, else of the model alone."""
     tests: Sequence[LineTest | None] = (measured.tests if measured else ()) or (None,)
     try:
         return [
@@ -157,12 +157,12 @@ def _transfers(
             for test in tests
             for image in transfer_images(found.scene, moves, turns, measured=test)
         ]
-    except ShaftFilmError:  # said beside the table of the films
+    except ShaftFilmError:  # reported with the table of the films
         return []
 
 
 def _measured(report: SagReport) -> dict[str, Any]:
-    """Sags by measured tests, for the page."""
+    """Sags from measured tests, for the page."""
     head, *rows = sag_rows(report)
     return {
         "headline": report.headline,
@@ -184,5 +184,5 @@ def save_html(
     note: str = "",
     force: bool = True,
 ) -> None:
-    """Write :func:`align_html` whole, or not at all."""
+    """Write :func:`align_html` atomically."""
     save_page(align_html(found, tested, measured=measured, note=note), path, force=force)

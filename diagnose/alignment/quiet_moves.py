@@ -1,8 +1,8 @@
-"""Bearing moves that make a running line quiet, within the limits of its alignment.
+"""Bearing moves that minimise the vibration of a running line within the limits of its alignment.
 
-The forces of the running line, its orders and its random ones, act through the transfer functions
-of the line as moved, films and beam solved together; what is made least is the mean power of the
-accelerations that the scene's sensors see.
+The forces of the running line, orders and random ones, act through the transfer functions of the
+moved line, with films and beam solved together. The moves minimise the mean power of the
+accelerations at the scene's sensors.
 """
 
 import math
@@ -32,18 +32,18 @@ from .margins import margin_of
 
 Vector = NDArray[np.float64]
 
-_LINES = 160  # of the random forces' band, in even ratios
+_LINES = 160  # of the random forces' band, in equal ratios
 _LOWEST = 2.0  # Hz
-_FIRST_STEP = 0.25  # of the way a bearing may move
-_LAST_STEP = 0.01e-3  # m: chocks are set no finer
-_GAIN = 2e-3  # of the power: less is not worth a step
+_FIRST_STEP = 0.25  # of the range in which a bearing may move
+_LAST_STEP = 0.01e-3  # m: finest setting of chocks
+_GAIN = 2e-3  # smallest relative reduction of the power that counts
 _MOST_TRIALS = 80
-_HEARD_DB = 0.1  # less is within the films' meshes
+_HEARD_DB = 0.1  # smaller changes are within the error of the films' meshes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Running:
-    """A line ready to be asked how much it vibrates, wherever its bearings stand.
+    """A line prepared for computing its vibration at any bearing positions.
 
     Attributes
     ----------
@@ -51,12 +51,12 @@ class Running:
     speed : float
         [rad/s]
     orders : FreeLine or None
-        At the frequencies of `harmonics`, from every place where one acts.
+        Condensed line at the frequencies of `harmonics`, from every place where one acts.
     harmonics : tuple of Harmonic
     band : FreeLine or None
-        At the lines of the random forces.
+        Condensed line at the spectral lines of the random forces.
     density : numpy.ndarray [shape=(n_sources, n_lines)]
-        Of these [N^2/Hz].
+        Spectral densities of the random forces [N^2/Hz].
     """
 
     model: LineModel
@@ -68,7 +68,7 @@ class Running:
 
 
 def running_line(scene: ShaftScene) -> Running:
-    """A scene's line with the forces of its running state.
+    """Line of a scene with the forces of its running state.
 
     Parameters
     ----------
@@ -125,17 +125,17 @@ def running_rms(running: Running, moves: Vector) -> Vector:
     ----------
     running : Running
     moves : numpy.ndarray [shape=(n,)]
-        Upward [m].
+        Upward moves [m].
 
     Returns
     -------
     numpy.ndarray [shape=(n_sensors,)]
-        rms of orders and random motion together [m/s^2].
+        Total rms of orders and random motion [m/s^2].
 
     Raises
     ------
     ShaftFilmError
-        The line does not rest on its films.
+        The line has no equilibrium on its films.
 
     Examples
     --------
@@ -164,18 +164,18 @@ def running_rms(running: Running, moves: Vector) -> Vector:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class QuietMoves:
-    """Moves that make a running line quieter, and by how much.
+    """Moves that make a running line quieter, and their effect.
 
     Attributes
     ----------
     calibration : Calibration
-        The moves; where none is worth making, those that the limits ask, if any.
+        The moves; if none helps, those that the limits require, if any.
     before, after : numpy.ndarray [shape=(n_sensors,)]
         rms of each accelerometer in the running line [m/s^2].
     trials : int
-        Lines computed.
+        Number of computed lines.
     moved : bool
-        Whether any bearing moves beyond what the limits ask.
+        Whether any bearing moves more than the limits require.
     """
 
     calibration: Calibration
@@ -186,7 +186,7 @@ class QuietMoves:
 
     @property
     def text(self) -> str:
-        """What the moves do to the vibration, in one sentence."""
+        """Effect of the moves on the vibration, in one sentence."""
         levels = [1e3 * float(np.sqrt(np.mean(rms**2))) for rms in (self.before, self.after)]
         change = 20 * math.log10(levels[1] / levels[0])
         said = (
@@ -199,32 +199,32 @@ class QuietMoves:
 
 
 def quiet_moves(scene: ShaftScene, found: Calibration, *, margin: float = 0.0) -> QuietMoves:
-    """Moves within limits and bounds that make the running line quietest, from those given.
+    """Moves within limits and bounds that minimise the vibration, starting from given ones.
 
     Parameters
     ----------
     scene : ShaftScene
     found : Calibration
-        Moves that meet the limits, from which the search starts.
+        Moves that meet the limits, as start of the search.
     margin : float
-        Distance that the line must keep from every limit, as a share of it.
+        Required distance from every limit, as a share of it.
 
     Returns
     -------
     QuietMoves
-        With the moves given, where these do not meet the limits or nothing is quieter.
+        With the given moves if these do not meet the limits or nothing is quieter.
 
     Raises
     ------
     AlignmentError
-        As of :func:`running_line`.
+        As in :func:`running_line`.
     ShaftFilmError
-        The line does not rest on its films as it is set.
+        The line has no equilibrium on its films as set.
 
     Notes
     -----
-    One bearing after the other is moved up and down by a step that is halved where no move helps:
-    a local search, of few variables and a function that is smooth but for the films' meshes.
+    One bearing after the other is moved up and down by a step, which is halved if no move helps: a
+    local search for few variables and a function that is smooth except for the films' meshes.
 
     Examples
     --------
@@ -270,7 +270,7 @@ def quiet_moves(scene: ShaftScene, found: Calibration, *, margin: float = 0.0) -
 
 
 class _Search:
-    """Mean power of a line with its bearings moved, of moves that are allowed."""
+    """Mean power of a line with its bearings moved, for allowed moves."""
 
     def __init__(self, running: Running, found: Calibration, margin: float) -> None:
         self.running, self.found = running, found
@@ -278,7 +278,7 @@ class _Search:
         self.margin = min([margin, *kept])
 
     def power(self, moves: Vector) -> float | None:
-        """Of the accelerations [(m/s^2)^2]; None where the moves are not allowed."""
+        """Mean power of the accelerations [(m/s^2)^2]; None if the moves are not allowed."""
         found = self.found
         seats = zip(found.line.seats, moves, strict=True)
         if any(not seat.least_move <= move <= seat.most_move for seat, move in seats):

@@ -1,4 +1,4 @@
-"""The alignment of a shaft line as a table for JSON."""
+"""Alignment of a shaft line as a table for JSON."""
 
 from typing import Any
 
@@ -14,14 +14,14 @@ ALIGN_SCHEMA = 1
 
 
 def align_table(found: Alignment) -> dict[str, Any]:
-    """Everything `wearstate align` says, in SI, ready for JSON.
+    """Results of `wearstate align` in SI, ready for JSON.
 
     Returns
     -------
     dict
-        ``schema_version``, ``scene``, ``verdict``, ``bearings``, ``conditions`` (the line as it
-        is set), ``influence_n_per_m``, ``margins``, ``jacks``, ``films`` at three speeds,
-        ``calibration``, ``vibration`` and ``jacking``, the last three null where not asked for.
+        ``schema_version``, ``scene``, ``verdict``, ``bearings``, ``conditions`` (the line as set),
+        ``influence_n_per_m``, ``margins``, ``jacks``, ``films`` at three speeds, ``calibration``,
+        ``vibration`` and ``jacking``, the last three null if not requested.
     """
     return {
         "schema_version": ALIGN_SCHEMA,

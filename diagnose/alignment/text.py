@@ -1,4 +1,4 @@
-"""The alignment of a shaft line as text."""
+"""Alignment of a shaft line as text."""
 
 import math
 from collections.abc import Sequence
@@ -9,12 +9,12 @@ from ...sim.alignment.jacking import Jacking
 from ...sim.alignment.move_programme import Block
 from .align import Alignment
 
-_TINY = 5e-6  # m, of a move: less than the last digit shown
-_MISLEADS = 0.02  # of a reaction, when jacking says another
+_TINY = 5e-6  # m: moves below the last digit shown
+_MISLEADS = 0.02  # of the reaction: a larger error of jacking is misleading
 
 
 def align_text(found: Alignment) -> str:
-    """The same for a terminal, in mm, kN, MPa and mm/m."""
+    """Alignment for a terminal, in mm, kN, MPa and mm/m."""
     blocks = [headline(found), *(_state_text(state) for state in found.states)]
     blocks.append(_influence_text(found))
     if found.calibration is not None:
@@ -27,7 +27,7 @@ def align_text(found: Alignment) -> str:
 
 
 def headline(found: Alignment) -> str:
-    """How many limits are not met, in one sentence."""
+    """Number of limits that are not met, in one sentence."""
     n, unmet = len(found.line.seats), len(found.unmet)
     names = ", ".join(state.condition.name for state in found.states)
     lifted = dict.fromkeys(name for state in found.states for name in state.lifted)
@@ -80,7 +80,7 @@ def _limits_text(line: AlignmentLine, i: int) -> str:
 
 
 def bearing_verdict(state: LineState, name: str) -> str:
-    """What of a bearing is beyond its limits, in words."""
+    """Quantities of a bearing beyond their limits, in words."""
     bad = [limit for limit in check(state) if limit.bearing == name and not limit.met]
     words = ["lifted"] if name in state.lifted else []
     words += [
@@ -99,18 +99,18 @@ _WORDS = {
 
 
 def _kilonewton(state: LineState, i: int) -> str:
-    """A reaction with digits that tell a hundredth of the line's mean."""
+    """A reaction with digits to a hundredth of the line's mean."""
     mean = float(state.reactions.mean()) / 1e3
     return fixed_digits(float(state.reactions[i]) / 1e3, 1 if mean >= 10 else 2 if mean >= 1 else 3)
 
 
 def fixed_digits(value: float, digits: int) -> str:
-    """A number without a minus in front of zeros; a dash where there is none."""
+    """A number without negative zeros; a dash for NaN."""
     return "-" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> str:
-    """Text columns, the first and those after the last number to the left."""
+    """Aligned text columns; the first and those of words are left-aligned."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     left = {0} | {k for k, head in enumerate(rows[0]) if head in ("limits", "verdict", "of")}
     return "\n".join(
@@ -130,7 +130,7 @@ def _influence_text(found: Alignment) -> str:
         (name, *(fixed_digits(value, 2) for value in row))
         for name, row in zip(found.line.names, matrix.tolist(), strict=True)
     ]
-    head = "influence: change of reaction per mm that the bearing above rises, kN/mm"
+    head = "influence: change of reaction per mm rise of the bearing in the column, kN/mm"
     if not state.contact.all():
         head += f"\nwith the points in contact of {state.condition.name}"
         head += "; a lifted bearing has none" if state.lifted else ""
@@ -152,7 +152,7 @@ def _calibration_text(found: Calibration, margin: float) -> str:
 
 
 def block_texts(blocks: Sequence[Block]) -> list[str]:
-    """One line for each block; contact of a bearing in several conditions is one."""
+    """One line for each block; contact of a bearing in several conditions is combined."""
     lifting: dict[str, list[str]] = {}
     for block in blocks:
         if block.quantity == "contact":
@@ -173,12 +173,12 @@ def move_lines(found: Calibration) -> list[str]:
         if abs(turn) > _TINY:
             lines.append(f"  turn the bore of {name} by {1e3 * turn:+.3f} mm/m")
     if not lines and not found.status.ok:
-        lines.append("  no move within its bounds brings them nearer")
+        lines.append("  no move within the bounds brings the limits nearer")
     return lines
 
 
 def margin_lines(found: Calibration, asked: float) -> list[str]:
-    """How far from the limits the line is after the moves, where that was asked or is nothing."""
+    """Margin of the line after the moves, if one was requested or a limit is just reached."""
     if not found.status.ok:
         return []
     kept = f"{100 * found.margin:.3g} %"
@@ -208,7 +208,7 @@ def reactions_before_after(found: Calibration) -> list[tuple[str, ...]]:
 
 
 def jacking_text(found: Jacking, condition: str) -> str:
-    """What jacking beside a bearing says of its reaction."""
+    """Reaction of a bearing by jacking next to it, in words."""
     lines = [
         f"jack beside {found.bearing} at {found.station:.3g} m, {condition}",
         f"  {found.first_slope / 1e6:.3g} kN/mm at first, {found.second_slope / 1e6:.3g} kN/mm "
@@ -220,7 +220,7 @@ def jacking_text(found: Jacking, condition: str) -> str:
     ]
     if found.others:
         off = abs(found.estimate - found.reaction) > _MISLEADS * found.reaction
-        judged = "misleads" if off else "is hardly touched"
+        judged = "is misleading" if off else "is hardly affected"
         lines.append(
             f"  contact changes at {', '.join(found.others)} on the way: the test {judged}"
         )

@@ -1,4 +1,4 @@
-"""What a wear model takes for granted: the same machines with one thing shifted.
+"""Sensitivity of a wear model to its assumptions: the same machines with one property changed.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
 ``datasets.file``, ``datasets.source``, ``datasets.draws``, ``datasets.recipe``,

@@ -1,8 +1,7 @@
-"""What a wear model takes for granted: the same machines again, with one thing shifted a row.
+"""Sensitivity of a wear model to its assumptions: the same machines with one property changed.
 
-Every machine is drawn from the model's recipe, under a seed that no data set has by custom, and
-judged as a user's recording would be: its conditions and its nameplate are known, where the model
-asks for them.
+Every machine is drawn from the model's recipe, with a seed that data sets do not use, and judged
+like a user's recording: conditions and nameplate are known if the model needs them.
 """
 
 import hashlib
@@ -35,7 +34,7 @@ from .scores import ShiftRow, ShiftVerdict, answer_of, row_of
 from .signals import SignalRow, signal_rows
 
 OWN_SEEDS = 2**62
-"""Added to the seed: data sets are made with small ones, so that no machine was trained on."""
+"""Added to the seed: data sets use small seeds, so that no machine was in the training."""
 
 BASELINE = "as trained"
 
@@ -43,15 +42,15 @@ Progress = Callable[[int, int], None]
 
 
 class Model(Protocol):
-    """What is asked of a model."""
+    """Required interface of a model."""
 
     @property
     def card(self) -> ModelCard:
-        """What it was trained on."""
+        """Card with its training data."""
 
     @property
     def noted(self) -> tuple[str, ...]:
-        """Conditions that it takes as inputs."""
+        """Conditions that are inputs of the model."""
 
     def estimate(
         self,
@@ -60,23 +59,23 @@ class Model(Protocol):
         conditions: Mapping[str, Any] | None = None,
         told: tuple[str, ...] = (),
     ) -> Estimate:
-        """What it says of a recording."""
+        """Estimate for a recording."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BlindSpots:
-    """What came out.
+    """Result of the sensitivity study.
 
     Attributes
     ----------
     recipe : str
-        Name.
-    baseline : Row
-        As trained.
+        Name of the recipe.
+    baseline : ShiftRow
+        Row without a change.
     rows : tuple of ShiftRow
-        Those done, in the order in which they were made.
+        Finished rows, in the order in which they were run.
     left : tuple of str
-        Keys of those that time did not suffice for.
+        Keys of rows for which time did not suffice.
     """
 
     recipe: str
@@ -86,13 +85,13 @@ class BlindSpots:
 
 
 def recipe_of(model: Model, name: str | None = None) -> Recipe:
-    """Recipe that a model's machines are drawn from, checked against its inputs.
+    """Recipe from which a model's machines are drawn, checked against its inputs.
 
     Parameters
     ----------
     model : Model
     name : str, optional
-        Built-in recipe or file; by default the one that the model's card names.
+        Built-in recipe or file; by default that of the model's card.
 
     Returns
     -------
@@ -101,8 +100,8 @@ def recipe_of(model: Model, name: str | None = None) -> Recipe:
     Raises
     ------
     DataError
-        The model names no recipe that is built in, is referenced or reads several tests, or the
-        recipe makes other recordings than it reads.
+        The model names no built-in recipe, is referenced or needs several tests, or the recordings
+        of the recipe do not fit its inputs.
     """
     card = model.card
     faults = []
@@ -117,7 +116,7 @@ def recipe_of(model: Model, name: str | None = None) -> Recipe:
     if faults:
         raise DataError("\n".join(f"the model: {fault}" for fault in faults))
     recipe = load_recipe(name or known)
-    if recipe.scene.fidelity == "auto":  # a choice of rungs is no part of the question
+    if recipe.scene.fidelity == "auto":  # keep the rungs fixed
         recipe = load_recipe(name or known, {"fidelity": "given"})
     _refuse_other_inputs(recipe, card)
     return recipe
@@ -137,8 +136,8 @@ def _refuse_other_inputs(recipe: Recipe, card: ModelCard) -> None:
         ),
     }
     faults = [
-        f"{recipe.name}: its records have another {what} than the model reads, {wanted}; name the "
-        f"recipe that it was trained on: --recipe"
+        f"{recipe.name}: its records have another {what} than the model needs, {wanted}; name the "
+        f"recipe of its training: --recipe"
         for what, (wanted, fits) in made.items()
         if not fits
     ]
@@ -148,7 +147,7 @@ def _refuse_other_inputs(recipe: Recipe, card: ModelCard) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class _Machines:
-    """The few machines of every row, and their recordings as trained."""
+    """The machines of every row, and their recordings without a change."""
 
     recipe: Recipe
     model: Model
@@ -161,7 +160,7 @@ class _Machines:
 
     @cached_property
     def recordings(self) -> dict[int, Recording]:
-        """As trained, by machine; those whose simulation fails are missing."""
+        """Recordings without a change, by machine; without failed simulations."""
         found = self.recorded([(s.scene, s.seed) for s in self.samples])
         return {
             sample.group: each
@@ -170,11 +169,11 @@ class _Machines:
         }
 
     def recorded(self, jobs: Sequence[tuple[Scene, int]]) -> list[Recording | str]:
-        """Recordings of scenes with their seeds, or why there is none."""
+        """Recordings of scenes with their seeds, or the reason for a failure."""
         found = dict(simulate_many(jobs))
-        return [self._told(jobs[n][0], found[n]) for n in range(len(jobs))]
+        return [self._checked(jobs[n][0], found[n]) for n in range(len(jobs))]
 
-    def _told(self, scene: Scene, solution: Recording | SceneError) -> Recording | str:
+    def _checked(self, scene: Scene, solution: Recording | SceneError) -> Recording | str:
         if isinstance(solution, SceneError):
             return "; ".join(solution.faults)
         if not solution.status.ok:
@@ -182,10 +181,10 @@ class _Machines:
         noted = {name: condition_of(scene, name) for name in self.model.noted}
         if solution.tacho is None:
             noted["speed_hz"] = condition_of(scene, "speed_hz")
-        return replace(solution, row=noted, numerics={})  # a model is told what was noted alone
+        return replace(solution, row=noted, numerics={})  # the model sees only noted conditions
 
     def judged(self, recording: Recording, scene: Scene, sample: Sample) -> ShiftVerdict:
-        """What the model says of a recording of a machine whose nameplate is known."""
+        """Verdict of the model on a recording of a machine with known nameplate."""
         sizes = frozenset(presentation_of(scene).sizes)
         plate = Nameplate(scene=scene, set_paths=sizes, assumed=True)
         context = recording_context(plate, recording, self.model.card)
@@ -194,7 +193,7 @@ class _Machines:
 
 
 def _samples(recipe: Recipe, machines: int, seed: int) -> list[Sample]:
-    """One record of each machine, of one early and the next late in its life where it has one."""
+    """One record of each machine, at alternating stages of life if there are several."""
     per = recipe.table.records_per_group
     skip = np.ones(machines * per, dtype=bool)
     skip[[group * per + group % per for group in range(machines)]] = False
@@ -203,7 +202,7 @@ def _samples(recipe: Recipe, machines: int, seed: int) -> list[Sample]:
 
 
 _Outcome = tuple[Sample, Scene, Recording | str]
-"""A machine, its scene with the shift, and its recording or why there is none."""
+"""A machine, its changed scene, and its recording or the reason for a failure."""
 
 
 def _baseline(machines: _Machines) -> Iterator[_Outcome]:
@@ -241,14 +240,14 @@ def _of_signal(machines: _Machines, row: SignalRow) -> Iterator[_Outcome]:
 
 @dataclass(frozen=True)
 class _Task:
-    """A row to be made."""
+    """A row to be run."""
 
     row: ShiftRow
     outcomes: Callable[[_Machines], Iterator[_Outcome]]
 
 
 def _tasks(scenes: Sequence[SceneRow], signals: Sequence[SignalRow]) -> list[_Task]:
-    """The baseline first, then the cheap rows of the signal, then those of the scene."""
+    """Tasks: the baseline, then the cheap rows of the signal, then those of the scene."""
 
     def empty(name: str, shift: str, kind: str, why: str) -> ShiftRow:
         return ShiftRow(name=name, shift=shift, kind=kind, why=why, said=())
@@ -264,29 +263,29 @@ def _tasks(scenes: Sequence[SceneRow], signals: Sequence[SignalRow]) -> list[_Ta
 
 
 def _chosen(tasks: Sequence[_Task], only: Sequence[str]) -> list[_Task]:
-    """The baseline, and the rows of which one of the texts is a part; all without a text."""
+    """The baseline, and the rows whose key contains one of the texts; all rows without texts."""
     baseline, *others = tasks
     wanted = [text for text in only if not any(text in task.row.key for task in others)]
     if wanted:
         names = ", ".join(dict.fromkeys(task.row.name for task in others))
-        raise DataError(f"only = {', '.join(wanted)}: no row is called so; there are {names}")
+        raise DataError(f"only = {', '.join(wanted)}: no row has this name; there are {names}")
     return [baseline, *(t for t in others if not only or any(text in t.row.key for text in only))]
 
 
 def kept_rows(path: Path | None, key: str) -> Kept[ShiftRow]:
-    """Finished rows in a file beside the output.
+    """Finished rows, kept in a file next to the output.
 
     Parameters
     ----------
     path : Path or None
-        None keeps nothing.
+        None: nothing is kept.
     key : str
-        Of :func:`run_key`.
+        From :func:`run_key`.
 
     Raises
     ------
     DataError
-        The file is damaged, or of another run.
+        The file is damaged, or belongs to another run.
     """
     return Kept(
         path,
@@ -323,23 +322,23 @@ def find_blind_spots(
     kept: Kept[ShiftRow] | None = None,
     progress: Progress | None = None,
 ) -> BlindSpots:
-    """Judge a model on the same machines, with one thing shifted at a time.
+    """Judge a model on the same machines, with one property changed at a time.
 
     Parameters
     ----------
     model : Model
     recipe : Recipe
-        As of :func:`recipe_of`.
+        From :func:`recipe_of`.
     machines : int
-        Drawn; one record of each, >= 1.
+        Number of drawn machines, >= 1; one record of each.
     seed : int
-        Of the draws and of noise, >= 0.
+        Seed of the draws and of noise, >= 0.
     budget : float, optional
-        Seconds after which no further row is begun; the baseline always is.
+        Time after which no further row is started [s]; the baseline is always run.
     scenes, signals : sequences of rows, optional
-        Of the scene and of the signal; all by default.
+        Rows of the scene and of the signal; by default all.
     only : sequence of str, optional
-        Parts of the rows' keys, "kind: name shift"; without it all rows are made.
+        Parts of the rows' keys, "kind: name shift"; by default all rows are run.
     kept : Kept, optional
         Rows of an earlier run; finished ones are added.
     progress : callable, optional
@@ -352,7 +351,7 @@ def find_blind_spots(
     Raises
     ------
     DataError
-        No machine could be simulated as trained, or no row is called so.
+        No machine could be simulated without a change, or no row has the name.
     """
     end = None if budget is None else time.monotonic() + budget
     store = kept_rows(None, "") if kept is None else kept

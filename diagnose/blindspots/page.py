@@ -1,4 +1,4 @@
-"""A list of blind spots as a page and a picture."""
+"""Blind spots as a page and a picture."""
 
 import textwrap
 from collections.abc import Sequence
@@ -20,26 +20,26 @@ _MOST = 25  # rows of the picture
 
 
 def blind_spots_html(table: Table, *, notice: str = "") -> str:
-    """A list of blind spots as one self-contained page: no script, no link, a picture inside.
+    """Blind spots as one self-contained page: no script, no link, with a picture.
 
     Parameters
     ----------
     table : dict
-        Of :func:`~.blindspots.text.blind_spots_table`.
+        From :func:`~.blindspots.text.blind_spots_table`.
     notice : str
-        Of the model, where it was trained on simulation.
+        Notice of the model, if it was trained on simulated data.
 
     Returns
     -------
     str
         HTML.
     """
-    told = [row for row in table["rows"] if row["machines"]]
+    simulated = [row for row in table["rows"] if row["machines"]]
     return render(
         "blindspots.html.j2",
         table=table,
-        told=[table["baseline"], *told],
-        untold=[row for row in table["rows"] if not row["machines"]],
+        simulated=[table["baseline"], *simulated],
+        failed=[row for row in table["rows"] if not row["machines"]],
         words=_WORDS,
         conclusion=conclusion(table),
         quantity=quantity_name(table["severity"]),
@@ -51,7 +51,7 @@ def blind_spots_html(table: Table, *, notice: str = "") -> str:
 
 
 def blind_spots_figure(table: Table) -> Any:
-    """Error without a caution of the worst rows, beside the one as trained.
+    """Error without a caution of the worst rows, compared with that as trained.
 
     Returns
     -------
@@ -74,13 +74,13 @@ def blind_spots_figure(table: Table) -> Any:
     axes.set_xlim(left=0)
     axes.set_xlabel("error without a caution [% of the condemning limit]", fontsize=8)
     axes.grid(axis="x", alpha=0.3)
-    if axes.get_legend_handles_labels()[1]:  # none where every verdict has a caution
+    if axes.get_legend_handles_labels()[1]:  # none if every verdict has a caution
         axes.legend(fontsize=8, loc="lower right")
     return figure
 
 
 def _shown(table: Table) -> list[Table]:
-    """Rows of the picture: the worst of those with a verdict without a caution."""
+    """Rows of the picture: the worst of those that have verdicts without a caution."""
     return [row for row in table["rows"] if row["clear_error"]["value"] is not None][:_MOST]
 
 

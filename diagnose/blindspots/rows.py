@@ -1,8 +1,8 @@
-"""Rows of a list of blind spots: what of a recipe's scene is shifted, and by how much.
+"""Rows of the blind spots: which properties of a recipe's scene are changed, and by how much.
 
-A value that the recipe draws is moved beyond its range, by a factor of 1.3 where it is drawn by its
-logarithm, else by 30 % of the range; one that it holds fixed by the table's amount. Severities, and
-angles drawn all round, are left alone.
+A value that the recipe draws is moved beyond its range, by a factor of 1.3 for a logarithmic
+distribution, otherwise by 30 % of the range; a fixed value is changed by the amount in the table.
+Severities, and angles drawn over the full circle, are not changed.
 """
 
 import math
@@ -24,7 +24,7 @@ from ..machines.shifts import Shift
 from ..pages.si_text import si_text
 
 BEYOND = 1.3
-"""Of the edge of a range drawn by its logarithm; of others 30 % of the range is added."""
+"""Factor beyond the edge of a logarithmic range; for others 30 % of the range is added."""
 
 _ALL_ROUND = 0.999 * math.tau
 
@@ -33,22 +33,22 @@ Kind = Literal["as trained", "fixed", "drawn", "sensor"]
 
 @dataclass(frozen=True, kw_only=True)
 class SceneRow:
-    """One value of the scene, shifted on every machine.
+    """One property of the scene, changed on every machine.
 
     Attributes
     ----------
     name : str
         Dotted path, ``*`` for every list entry.
     shift : str
-        In words.
+        The change in words.
     kind : {"fixed", "drawn"}
-        Whether the recipe holds it fixed or draws it.
+        Whether the recipe keeps it fixed or draws it.
     why : str
-        How such a difference comes about; empty where nobody said.
+        Cause of such a difference; empty if unknown.
     changes : callable
         Machine's scene -> new values by dotted path.
     option : optional
-        Option of the recipe that draws the value: every machine is given it.
+        Option of the recipe that draws the value; every machine gets it.
     """
 
     name: str
@@ -60,31 +60,31 @@ class SceneRow:
     option: "_Option | None" = None
 
     def applied(self, recipe: Recipe, sample: Sample) -> Scene:
-        """Scene of a machine with this one thing shifted.
+        """Scene of a machine with this one property changed.
 
         Raises
         ------
         SceneError
-            The machine lacks the value, or its scene refuses it.
+            The machine lacks the value, or its scene rejects the change.
         """
         drawn = sample.drawn if self.option is None else self.option.taken_by(sample)
         machine = scene_from_table(override(recipe.base, drawn))
         changes = self.changes(machine)
         if not changes:
-            fault = f"{self.name} has no value on this machine; there is nothing to shift"
+            fault = f"{self.name} has no value on this machine; there is nothing to change"
             raise SceneError(machine.name, [fault])
         return scene_from_table(override(recipe.base, {**drawn, **changes}))
 
 
 @dataclass(frozen=True)
 class _Option:
-    """One option of a recipe's choice, put on every machine."""
+    """One option of a recipe's choice, applied to every machine."""
 
     choice: Alternatives
     option: Taken
 
     def taken_by(self, sample: Sample) -> dict[str, Any]:
-        """Draws of a machine that has this option: its own where it has, else the middle."""
+        """Draws of a machine with this option: its own if it has it, else medians."""
         if sample.row[self.choice.column] == self.option.name:
             return sample.drawn
         others = {p: v for p, v in sample.drawn.items() if p not in self.choice.paths}
@@ -93,13 +93,13 @@ class _Option:
 
 
 def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[SceneRow]:
-    """Every row of a recipe's scene, what it holds fixed first.
+    """All rows of a recipe's scene, fixed values first.
 
     Parameters
     ----------
     recipe : Recipe
     shifts : sequence of Shift, optional
-        Those of the machine by default.
+        By default those of the machine.
 
     Returns
     -------
@@ -123,12 +123,12 @@ def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[Sc
         if shift.path not in worn | names
         for row in _fixed_rows(shift, recipe)
     ]
-    told = {shift.path: shift for shift in known}
+    by_path = {shift.path: shift for shift in known}
     beyond = [
         row
         for each in drawn
         if each.path not in worn
-        for row in _beyond_rows(each, told.get(each.path), type(recipe.scene))
+        for row in _beyond_rows(each, by_path.get(each.path), type(recipe.scene))
     ]
     return [*fixed, *beyond]
 
@@ -139,7 +139,7 @@ def _pattern(path: str) -> str:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """All that a recipe draws at one path with ``*``, everywhere or where an option is taken."""
+    """All that a recipe draws at one path with ``*``, in general or with an option."""
 
     path: str
     axes: tuple[Axis, ...]
@@ -163,7 +163,7 @@ def _by_pattern(axes: Sequence[Axis], option: _Option | None) -> list[_Drawn]:
 
 
 def _expanded(shift: Shift, recipe: Recipe) -> Iterator[Shift]:
-    """The row as it is where the scene has its path, and under every throw that has it."""
+    """The shift itself if the scene has its path, and the same for every throw that has it."""
     for prefix in ("", "throws.*."):
         path = prefix + shift.path
         if _paths(path, recipe.scene, recipe.base) or (shift.adds and not prefix):
@@ -172,7 +172,7 @@ def _expanded(shift: Shift, recipe: Recipe) -> Iterator[Shift]:
 
 
 def _paths(pattern: str, scene: Scene, table: Mapping[str, Any]) -> list[str]:
-    """Paths of a pattern that a scene has something at."""
+    """Paths of a pattern at which a scene has a value."""
     try:
         found = matches(table, pattern)
     except SceneError:
@@ -198,7 +198,7 @@ def _fixed_rows(shift: Shift, recipe: Recipe) -> Iterator[SceneRow]:
 
 
 def _taken(path: str, recipe: Recipe) -> set[Any]:
-    """Values that a path takes without any shift: the scene's own and those of options."""
+    """Values of a path without a change: that of the scene and those of options."""
     options = [option.values for each in recipe.choices for option in each.options]
     values = {v for each in options for p, v in each.items() if _pattern(p) == path}
     values |= {value_at(recipe.scene, p) for p in _paths(path, recipe.scene, recipe.base)}
@@ -243,14 +243,14 @@ def _refuse_unread(shift: Shift, scene: Scene) -> None:
     for path, needed in shift.under.items():
         value = value_at(scene, path)
         if value != needed:
-            fault = f"{shift.path} counts where {path} = {needed!r} alone, and it is {value!r}"
+            fault = f"{shift.path} only matters if {path} = {needed!r}, and it is {value!r}"
             raise SceneError(scene.name, [fault])
 
 
 # --- drawn values ---------------------------------------------------------------------------------
 
 
-def _beyond_rows(drawn: _Drawn, told: Shift | None, machine: type[Scene]) -> Iterator[SceneRow]:
+def _beyond_rows(drawn: _Drawn, known: Shift | None, machine: type[Scene]) -> Iterator[SceneRow]:
     axes = drawn.axes
     if any(_all_round(axis) for axis in axes):
         return
@@ -261,14 +261,14 @@ def _beyond_rows(drawn: _Drawn, told: Shift | None, machine: type[Scene]) -> Ite
             name=drawn.path,
             shift=f"{side}, {_shown(axes, ends, side, machine)}{where}",
             kind="drawn",
-            why=told.why if told else "beyond the range that the recipe draws from",
+            why=known.why if known else "beyond the range that the recipe draws from",
             changes=_mover(ends),
             option=drawn.option,
         )
 
 
 def _sides(axis: Axis) -> tuple[str, ...]:
-    """Sides of a range; one that begins at zero goes on upwards alone."""
+    """Sides of a range; only the upper one if it begins at zero."""
     if isinstance(axis, Vector):
         return ("outward",)
     return ("above",) if axis.extremes()[0] == 0 else ("below", "above")
@@ -285,7 +285,7 @@ _Move = Callable[[Any], Any]
 
 
 def _beyond(axis: Axis, side: str) -> _Move:
-    """From the machine's own value to the one beyond the range."""
+    """Function from the machine's own value to one beyond the range."""
     if isinstance(axis, Vector):
         centre = axis.base
         return lambda own: {
@@ -296,7 +296,7 @@ def _beyond(axis: Axis, side: str) -> _Move:
 
 
 def _edge(ends: tuple[float, float], side: str, *, logarithmic: bool) -> float:
-    """Value beyond a range; a bound above zero is not crossed into negative numbers."""
+    """Value beyond a range; the sign never changes."""
     low, high = ends
     step = (BEYOND - 1) * (high - low)
     if logarithmic:
@@ -308,7 +308,7 @@ def _edge(ends: tuple[float, float], side: str, *, logarithmic: bool) -> float:
 
 def _shown(axes: Sequence[Axis], ends: Mapping[str, _Move], side: str, machine: type[Scene]) -> str:
     if isinstance(axes[0], Vector):
-        return f"{BEYOND:g} x as far from the scene's own"
+        return f"{BEYOND:g} x the distance from the scene's values"
     values = {ends[axis.path](None) for axis in axes}
     if len(values) == 1:
         return f"= {_with_unit(next(iter(values)), axes[0].path, machine)}"

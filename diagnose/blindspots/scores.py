@@ -1,4 +1,4 @@
-"""Figures of each row of a list of blind spots, with intervals over machines, and their order."""
+"""Figures of each row of the blind spots, with intervals over machines, and their ranking."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,10 +11,10 @@ from ..learning.scores import ScoreFigure, resampled, share
 from ..wear_model.verdict import Estimate
 
 FIGURES = (
-    ("clear_error", "mean error of what is graded without a caution that counts, over the limit"),
-    ("error", "mean error of all that is graded, over the condemning limit"),
-    ("bias", "mean signed error of all that is graded, over the limit"),
-    ("coverage", "share of the intervals that hold the severity"),
+    ("clear_error", "mean error of records graded without a caution that counts, over the limit"),
+    ("error", "mean error of all graded records, over the condemning limit"),
+    ("bias", "mean signed error of all graded records, over the limit"),
+    ("coverage", "share of the intervals that contain the severity"),
     ("refused", "share without a grade: unfamiliar or unusable"),
     ("cautioned", "share graded with a caution that counts"),
 )
@@ -23,7 +23,7 @@ FIGURES = (
 
 @dataclass(frozen=True, kw_only=True)
 class ShiftVerdict:
-    """What a model said of one machine.
+    """Verdict of a model on one machine.
 
     Attributes
     ----------
@@ -32,11 +32,11 @@ class ShiftVerdict:
     truth : float
         Severity [m].
     verdict : str
-        As of :class:`~.wear_model.verdict.Estimate`.
+        As in :class:`~.wear_model.verdict.Estimate`.
     found, low, high : float or None
         Estimate and interval [m]; None without a grade.
     cautions : tuple of str
-        Of the estimate.
+        Cautions of the estimate.
     """
 
     machine: int
@@ -49,7 +49,7 @@ class ShiftVerdict:
 
 
 def answer_of(estimate: Estimate, machine: int, truth: float) -> ShiftVerdict:
-    """What is kept of an estimate."""
+    """Part of an estimate that is kept."""
     ends = (estimate.severity, estimate.low, estimate.high) if estimate.graded else (None,) * 3
     return ShiftVerdict(
         machine=machine,
@@ -64,17 +64,17 @@ def answer_of(estimate: Estimate, machine: int, truth: float) -> ShiftVerdict:
 
 @dataclass(frozen=True, kw_only=True)
 class ShiftRow:
-    """One row: what was shifted, and what the model said of every machine.
+    """One row: a change, and the verdicts of the model on every machine.
 
     Attributes
     ----------
     name, shift, why : str
-        What, by how much, and how it comes about.
+        What was changed, by how much, and the cause in practice.
     kind : {"as trained", "fixed", "drawn", "sensor"}
     said : tuple of ShiftVerdict
-        Of the machines that could be simulated so.
+        Verdicts on the machines that could be simulated.
     faults : tuple of str
-        Of those that could not.
+        Faults of those that could not.
     """
 
     name: str
@@ -86,16 +86,16 @@ class ShiftRow:
 
     @property
     def key(self) -> str:
-        """Tells it from every other row."""
+        """Unique name of the row."""
         return f"{self.kind}: {self.name} {self.shift}"
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Row for JSON."""
         return asdict(self)
 
 
 def row_of(stored: Mapping[str, Any]) -> ShiftRow:
-    """A row from what :meth:`Row.as_dict` gave."""
+    """Row from the result of :meth:`ShiftRow.as_dict`."""
     said = tuple(
         ShiftVerdict(**{**each, "cautions": tuple(each["cautions"])}) for each in stored["said"]
     )
@@ -103,7 +103,7 @@ def row_of(stored: Mapping[str, Any]) -> ShiftRow:
 
 
 def usual_cautions(baseline: ShiftRow) -> frozenset[str]:
-    """Cautions that every machine has as trained: they tell no row from another.
+    """Cautions that every machine has without a change, so that they do not distinguish rows.
 
     Examples
     --------
@@ -120,20 +120,20 @@ def usual_cautions(baseline: ShiftRow) -> frozenset[str]:
 def row_figures(
     row: ShiftRow, limit: float, usual: frozenset[str] = frozenset()
 ) -> dict[str, ScoreFigure]:
-    """Every one of :data:`FIGURES`.
+    """All :data:`FIGURES` of a row.
 
     Parameters
     ----------
-    row : Row
+    row : ShiftRow
     limit : float
         Condemning limit [m].
     usual : frozenset of str
-        Cautions that do not count, of :func:`usual_cautions`.
+        Cautions that do not count, from :func:`usual_cautions`.
 
     Returns
     -------
     dict
-        NaN where no machine tells.
+        NaN if no machine contributes.
 
     Examples
     --------
@@ -170,7 +170,7 @@ def row_figures(
 
 
 def _warned(said: ShiftVerdict, usual: frozenset[str]) -> bool:
-    """Whether a caution counts; one without words does."""
+    """Whether a verdict has a caution that counts; one without text does."""
     return said.verdict == "caution" and (not said.cautions or not usual.issuperset(said.cautions))
 
 
@@ -181,10 +181,10 @@ def _numbers(pairs: Iterable[tuple[float | None, float]]) -> Any:
 def ranked(
     rows: Sequence[ShiftRow], limit: float, usual: frozenset[str] = frozenset()
 ) -> list[ShiftRow]:
-    """Rows by the error of what is graded without a caution that counts, worst first.
+    """Rows by the error of records graded without a caution that counts, worst first.
 
-    Rows of which nothing is graded so follow, by the error of all that is graded: there the model
-    warns of itself. Rows that no machine could be simulated for come last.
+    Rows without such records follow, by the error of all graded ones: there the model warns by
+    itself. Rows without any simulated machine come last.
     """
 
     def place(row: ShiftRow) -> tuple[int, float]:

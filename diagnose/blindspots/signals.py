@@ -1,4 +1,4 @@
-"""What sensor, cable and converter may do to a recording, as rows of a list of blind spots."""
+"""Effects of sensor, cable and converter on a recording, as rows of the blind spots."""
 
 import math
 from collections.abc import Callable
@@ -26,10 +26,10 @@ NOISE_DB = (-30, -20, -10)
 """Levels of added noise over the rms of each channel about its mean [dB]."""
 
 GAIN = 1.26
-"""Of a sensor 2 dB off its sensitivity."""
+"""Gain error of a sensor 2 dB off its sensitivity."""
 
 MOUNT_HZ, MOUNT_DAMPING = 7e3, 0.05
-"""Accelerometer on a magnet (usual figures of data sheets)."""
+"""Mounted resonance [Hz] and damping of an accelerometer on a magnet (usual data-sheet values)."""
 
 ALIAS_SHARE, ALIAS_ORDER = 0.39, 6
 """Cut-off over the sample rate of the low-pass before a converter, and its order."""
@@ -38,19 +38,19 @@ BITS, HEADROOM = 12, 2.0
 """Word length of an old converter; its full scale over the largest value."""
 
 LATE_DEG = (1.0, 2.0, 5.0)
-"""Shaft angles by which a tacho's mark may be late."""
+"""Possible delays of a tacho's mark [deg]."""
 
 MAINS_HZ = 50.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class SignalRow:
-    """One shift of the recorded signal.
+    """One change of the recorded signal.
 
     Attributes
     ----------
     name, shift, why : str
-        What, by how much, and how it comes about.
+        What is changed, by how much, and the cause in practice.
     apply : callable
         Recording, shaft speed [Hz] and random stream -> recording.
     """
@@ -62,12 +62,12 @@ class SignalRow:
 
 
 def signal_rows(background: Path | None = None) -> list[SignalRow]:
-    """All rows about sensors.
+    """All rows of the signal.
 
     Parameters
     ----------
     background : Path, optional
-        A recording of the surroundings, of any format and unit that the program reads.
+        A recording of the surroundings, in any readable format and unit.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def _mains(n: int, fs: float, rms: float, rng: np.random.Generator) -> Float:
 
 
 def _each(recording: Recording, change: Callable[[Float], Float]) -> Recording:
-    """Every channel but the tacho changed."""
+    """Change every channel except the tacho."""
     signal = recording.signal.astype(float)
     for i, name in enumerate(recording.names):
         if name != recording.tacho:
@@ -174,9 +174,9 @@ def _gained(recording: Recording) -> Recording:
 
 
 def _mounted(recording: Recording) -> Recording:
-    """Accelerometers alone: a proximity probe has no mounted resonance."""
+    """Apply a mounted resonance to accelerometers; proximity probes have none."""
     if not any(channel.quantity == "acceleration" for channel in recording.channels):
-        raise DataError("no channel is an acceleration; nothing resonates on its mount")
+        raise DataError("no channel is an acceleration; there is no mounted resonance")
     poles = mounting_poles(MOUNT_HZ, MOUNT_DAMPING)
     signal = recording.signal.astype(float)
     for i, channel in enumerate(recording.channels):
@@ -202,7 +202,7 @@ def _coarse(recording: Recording) -> Recording:
 def _late(degrees: float) -> Callable[[Recording, float, np.random.Generator], Recording]:
     def apply(recording: Recording, speed: float, _rng: np.random.Generator) -> Recording:
         if recording.tacho is None or speed <= 0:
-            raise DataError("the recording has no tacho of a turning shaft; nothing can be late")
+            raise DataError("the recording has no tacho of a rotating shaft that could be late")
         samples = degrees / 360 / speed * recording.sample_rate
         place = np.arange(recording.signal.shape[1], dtype=float)
         signal = recording.signal.astype(float)
@@ -221,15 +221,15 @@ def _unnoted(recording: Recording) -> Recording:
 def _without_first(recording: Recording, speed: float, _rng: np.random.Generator) -> Recording:
     first = math.ceil(recording.sample_rate / speed) if speed > 0 else 0
     if not 0 < first < recording.signal.shape[1]:
-        raise DataError("the recording holds no whole revolution; none can be missing")
+        raise DataError("the recording contains no whole revolution that could be missing")
     return replace(recording, signal=recording.signal[:, first:])
 
 
 def _sound(path: Path) -> tuple[Float, float]:
-    """First vibration channel of a file, of rms 1, and its sample rate [Hz]."""
+    """First vibration channel of a file, scaled to rms 1, and its sample rate [Hz]."""
     try:
         recording = read_recording(path)
-    except DataError:  # it may lack a unit alone: its level is set by each channel's own
+    except DataError:  # perhaps only the unit is missing, which does not matter here
         recording = read_recording(path, SourceOptions(unit=EachChannel({}, others="m/s^2")))
     sound = recording.vibration[0].astype(float)
     sound -= sound.mean()
@@ -239,7 +239,7 @@ def _sound(path: Path) -> tuple[Float, float]:
 
 
 def _repeated(sound: Float, rate: float) -> _Noise:
-    """The sound from anywhere in it, at the recording's rate, as often as it takes."""
+    """Noise source that repeats the sound from a random start, at the recording's rate."""
 
     def make(n: int, fs: float, rms: float, rng: np.random.Generator) -> Float:
         from scipy.signal import resample_poly

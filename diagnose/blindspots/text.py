@@ -1,4 +1,4 @@
-"""A list of blind spots as a table for JSON and as text."""
+"""Blind spots as a table for JSON and as text."""
 
 import math
 from collections.abc import Mapping
@@ -16,22 +16,22 @@ FEW = 20
 
 
 def blind_spots_table(found: BlindSpots, card: ModelCard) -> Table:
-    """A list of blind spots, ready for JSON.
+    """Blind spots, ready for JSON.
 
     Parameters
     ----------
     found : BlindSpots
     card : ModelCard
-        Of the model.
+        Card of the model.
 
     Returns
     -------
     dict
         ``recipe``, ``severity``, ``condemning_limit_m``, ``machines``; ``baseline`` and ``rows``,
         the worst first, each with name, shift, kind, why, machines, figures (value, low, high; None
-        where no machine tells), what was said of every machine, and the faults of those that could
-        not be simulated; ``usual_cautions``, which every machine has as trained and no figure
-        counts; ``left`` names rows that time did not suffice for.
+        if no machine contributes), the verdict on every machine, and the faults of those that could
+        not be simulated; ``usual_cautions``, which every machine has without a change and which do
+        not count; ``left`` names rows for which time did not suffice.
     """
     limit, usual = float(card.condemning_limit_m), usual_cautions(found.baseline)
     return {
@@ -64,9 +64,9 @@ def _plain(figure: ScoreFigure) -> dict[str, float | None]:
 
 
 def conclusion(table: Table) -> list[str]:
-    """What the list says, in a sentence or two."""
+    """Conclusion in a sentence or two."""
     usual = table["baseline"]["clear_error"]["value"]
-    told = [row for row in table["rows"] if row["clear_error"]["value"] is not None]
+    clear = [row for row in table["rows"] if row["clear_error"]["value"] is not None]
     shown = (
         "As trained, no verdict is without a caution"
         if usual is None
@@ -74,8 +74,8 @@ def conclusion(table: Table) -> list[str]:
         "condemning limit"
     )
     lines = [f"{shown} ({table['machines']} simulated machines of {table['recipe']})."]
-    if told:
-        worst = told[0]
+    if clear:
+        worst = clear[0]
         lines.append(
             f"Largest error without a caution: {worst['name']} {worst['shift']}, "
             f"{percent(worst['clear_error']['value'])} %."
@@ -105,7 +105,7 @@ _HEAD = ("no caution", "all graded", "bias", "covered", "refused", "cautioned", 
 
 
 def blind_spots_text(table: Table) -> str:
-    """The list for a terminal: per cent of the condemning limit, or of the machines."""
+    """Blind spots for a terminal: per cent of the condemning limit, or of the machines."""
     rows = [table["baseline"], *(row for row in table["rows"] if row["machines"])]
     names = [f"{row['name']} {row['shift']}".strip() for row in rows]
     wide = max(map(len, names))

@@ -1,4 +1,4 @@
-"""Whether a recording is of the kind trained on: distance, noise floor, quietness, bandwidth.
+"""Whether a recording resembles the training data: distance, noise floor, quietness, bandwidth.
 
 It may import ``diagnose.feature_rows``.
 """

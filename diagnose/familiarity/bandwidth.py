@@ -1,8 +1,8 @@
-"""Whether a channel's band ends below where it did in training: by a filter, or a loose mounting.
+"""Whether a channel's band ends below that of the training, due to a filter or a loose mounting.
 
-A knock is short, so it sounds in all bands. A channel whose highest band is far quieter than those
-below suggest was cut off, which no level of noise tells: a clean sensor is quiet there as well,
-but not during a knock.
+A knock is short and therefore excites all bands. If the highest band is far quieter than the lower
+ones suggest, the channel was cut off. The noise level cannot show this: a clean sensor is quiet
+there as well, but not during a knock.
 """
 
 from collections.abc import Sequence
@@ -16,21 +16,21 @@ from ..feature_rows.physical import Columns, columns_of
 Float = NDArray[np.float64]
 
 CUT_OFF_SHARE = 0.005
-"""Of familiar recordings, in each channel: that may be cautioned for it."""
+"""Share of familiar recordings that may get this caution, per channel."""
 
-_STILL = 1e-6  # dB^2: a middle that varies less is constant
-_MIDDLE = (0.2, 0.4)  # of the highest frequency, which the highest band is held against
+_STILL = 1e-6  # dB^2: middle bands that vary less are constant
+_MIDDLE = (0.2, 0.4)  # of the highest frequency: bands compared with the highest one
 
 
 class UsualTops(NamedTuple):
-    """Level of the highest band to expect from the middle ones, of channels with a map.
+    """Expected level of the highest band, given the middle ones, for channels with a map.
 
     Attributes
     ----------
     offset, slope : numpy.ndarray [shape=(n_channels,)]
         ``top = offset + slope * middle`` [dB].
     most : numpy.ndarray [shape=(n_channels,)]
-        How far the highest band of few familiar recordings is below that [dB].
+        Shortfall of the highest band that few familiar recordings exceed [dB].
     """
 
     offset: Float
@@ -45,9 +45,9 @@ class CutOff(NamedTuple):
     ----------
     channel : str
     edge_hz : float
-        Where that band begins.
+        Lower edge of that band.
     lacking_db, most_db : float
-        How far it is below what is to be expected, and may be [dB].
+        Shortfall relative to the expected level, and its limit [dB].
     """
 
     channel: str
@@ -57,19 +57,19 @@ class CutOff(NamedTuple):
 
 
 def fit_tops(names: Sequence[str], rows: Float) -> UsualTops:
-    """Learn what the highest band of each channel is beside the middle ones.
+    """Fit the expected level of each channel's highest band to the middle ones.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
-        Of familiar recordings.
+        Rows of familiar recordings.
 
     Returns
     -------
     UsualTops
-        By least squares; a level where the middle never varies.
+        Least-squares fit; a constant if the middle bands do not vary.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def cut_off(names: Sequence[str], row: Float, usual: UsualTops) -> list[CutOff]:
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     row : numpy.ndarray [shape=(n_features,)]
     usual : UsualTops
     """
@@ -117,7 +117,7 @@ def tops_in(names: Sequence[str]) -> int:
 
 
 def _knocking(names: Sequence[str]) -> dict[str, Columns]:
-    """Channels that have a crank-angle map, and bands enough."""
+    """Channels with a crank-angle map and enough bands."""
     return {
         channel: columns
         for channel, columns in columns_of(tuple(names)).items()
@@ -126,14 +126,14 @@ def _knocking(names: Sequence[str]) -> dict[str, Columns]:
 
 
 def _middle(columns: Columns) -> list[int]:
-    """Places of the middle bands among all."""
+    """Indices of the middle bands."""
     highest = columns.edges[-1][1]
     low, high = (share * highest for share in _MIDDLE)
     return [i for i, (a, b) in enumerate(columns.edges[:-1]) if low <= a and b <= high]
 
 
 def _levels(columns: Columns, rows: Float) -> tuple[Float, Float]:
-    """Of the middle bands together, and of the highest [dB, shape=(n,)]."""
+    """Total level of the middle bands, and level of the highest [dB, shape=(n,)]."""
     bands = rows[:, columns.bands]
     middle = 10 * np.log10((10 ** (bands[:, _middle(columns)] / 10)).sum(axis=1))
     return middle, bands[:, -1]

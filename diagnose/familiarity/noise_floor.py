@@ -1,9 +1,9 @@
-"""Noise floor of a recording: how loud it is where the turn is quiet, against familiar machines.
+"""Noise floor of a recording: its level at quiet crank angles, compared with familiar machines.
 
-A knock rings down within a small part of a turn. What the quietest angles still show in every band
-is the noise of sensor, cable and surroundings, or another machine near by. More of it than any
-familiar recording has hides what a sound machine shows; less of it takes nothing away, so a model
-sees a cleaner recording with the least noise that it knows.
+A knock decays within a small part of a revolution. The level at the quietest angles in every band
+is noise of sensor, cable and surroundings, or of another machine nearby. More noise than in any
+familiar recording hides the signature of the machine. Less noise does no harm: the model sees a
+cleaner recording with the lowest noise of its training.
 """
 
 from collections.abc import Sequence
@@ -17,19 +17,19 @@ from ..feature_rows.physical import Columns, columns_of
 Float = NDArray[np.float64]
 
 NOISY_SHARE = 0.01
-"""Of familiar recordings: that may be cautioned for their noise floor."""
+"""Share of familiar recordings that may get a caution for their noise floor."""
 
-_QUIET = 0.1  # of all angles are quieter than what counts as the floor: single cells scatter
-_USUAL = 0.998  # of familiar recordings have less in a band than its ceiling
-_BANDS = 2  # that must show it: one alone may be a resonance that rings all round
-_NEVER = -1e4  # dB: no signal is so far below another
-_CLEANEST = 0.02  # of familiar recordings have less noise than what counts as the least usual
-_QUIET_BANDS = 0.25  # of the bands of a channel without a map have nothing but noise in them
+_QUIET = 0.1  # quantile over the angles that counts as floor: single cells scatter
+_USUAL = 0.998  # quantile of familiar recordings that is the ceiling of a band
+_BANDS = 2  # fewest noisy bands: a single one may be a resonance without decay
+_NEVER = -1e4  # dB: below any level difference
+_CLEANEST = 0.02  # quantile of familiar recordings that is the lowest usual noise
+_QUIET_BANDS = 0.25  # share of bands of a channel without a map that contain only noise
 _ROUNDING = 1e-6  # dB
 
 
 class NoiseFloor(NamedTuple):
-    """Floor of a recording beside that of familiar ones.
+    """Noise floor of a recording relative to that of familiar ones.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class NoiseFloor(NamedTuple):
 
 
 def noise_floors(names: Sequence[str], rows: Float) -> dict[str, Float]:
-    """Level of the quiet angles of every channel that has a crank-angle map.
+    """Level at the quiet angles of every channel with a crank-angle map.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def noise_floors(names: Sequence[str], rows: Float) -> dict[str, Float]:
     Returns
     -------
     dict of str to numpy.ndarray [shape=(n, n_bands)]
-        By channel, in every band [dB].
+        Channel -> level in every band [dB].
 
     Examples
     --------
@@ -75,7 +75,7 @@ def _quiet_cells(cells: Float, angles: int) -> Float:
 
 
 def swing_of_turn(names: Sequence[str], row: Float) -> float:
-    """By how much the level swings within a turn, as knocks make it.
+    """Variation of the level within a revolution, as caused by knocks.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ def swing_of_turn(names: Sequence[str], row: Float) -> float:
     Returns
     -------
     float
-        Loudest less quietest angle of a channel's crank-angle map, the median of its bands, of the
-        channel where that is most [dB]; 0 without a map.
+        Range over the angles of the crank-angle map, median over the bands, maximum over the
+        channels [dB]; 0 without a map.
 
     Examples
     --------
@@ -107,20 +107,20 @@ def floors_in(names: Sequence[str]) -> int:
 
 
 def fit_least(names: Sequence[str], rows: Float) -> Float:
-    """Least usual noise of every channel.
+    """Lowest usual noise of every channel.
 
     Parameters
     ----------
     names : sequence of str
         Of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
-        Of familiar recordings.
+        Rows of familiar recordings.
 
     Returns
     -------
     numpy.ndarray [shape=(n_levels,)]
-        [dB]: of a channel with a crank-angle map the floor of every band, of another that has
-        bands the density, per hertz, that a quarter of them stay below.
+        For a channel with a crank-angle map the floor of every band, for another with bands the
+        first quartile of their density per hertz [dB].
 
     Examples
     --------
@@ -133,7 +133,7 @@ def fit_least(names: Sequence[str], rows: Float) -> Float:
 
 
 def lifted_rows(names: Sequence[str], rows: Float, least: Float) -> Float:
-    """Feature rows as they would be with the least usual noise, where they have less.
+    """Raise the noise in feature rows to the lowest usual level.
 
     Parameters
     ----------
@@ -141,14 +141,14 @@ def lifted_rows(names: Sequence[str], rows: Float, least: Float) -> Float:
         Of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
     least : numpy.ndarray [shape=(n_levels,)]
-        Of :func:`fit_least` [dB].
+        From :func:`fit_least` [dB].
 
     Returns
     -------
     numpy.ndarray [shape=(n, n_features)]
-        The mean square that a channel lacks is added to the cells of its map, band by band, or to
-        its bands, by their width: so little that a knock does not feel it. Rows that lack none are
-        as they were.
+        The missing mean square of a channel is added to the cells of its map, band by band, or to
+        its bands, in proportion to their width; knocks are hardly affected. Rows with enough noise
+        are unchanged.
 
     Examples
     --------
@@ -177,7 +177,7 @@ def lifted_rows(names: Sequence[str], rows: Float, least: Float) -> Float:
 
 
 def _noise_levels(names: Sequence[str], rows: Float) -> dict[str, Float]:
-    """Noise of every channel [dB, shape=(n, n_levels)], as of :func:`fit_least`."""
+    """Noise of every channel [dB, shape=(n, n_levels)], as in :func:`fit_least`."""
     found = noise_floors(names, rows)
     return {
         channel: found[channel] if columns.cells else _density(rows[:, columns.bands], columns)
@@ -187,7 +187,7 @@ def _noise_levels(names: Sequence[str], rows: Float) -> dict[str, Float]:
 
 
 def _density(levels: Float, columns: Columns) -> Float:
-    """Of the quieter bands, per hertz [dB, shape=(n, 1)]."""
+    """Level per hertz of the quieter bands [dB, shape=(n, 1)]."""
     density = levels - 10 * np.log10(_widths(columns))
     return np.asarray(np.quantile(density, _QUIET_BANDS, axis=1))[:, None]
 
@@ -202,13 +202,13 @@ def noise_levels_in(names: Sequence[str]) -> int:
 
 
 def fit_ceiling(names: Sequence[str], rows: Float) -> Float:
-    """Loudest usual floor of every channel and band [dB, shape=(n_channels * n_bands,)]."""
+    """Highest usual floor of every channel and band [dB, shape=(n_channels * n_bands,)]."""
     floors = [np.zeros((len(rows), 0)), *noise_floors(names, rows).values()]
     return np.asarray(np.quantile(np.hstack(floors), _USUAL, axis=0))
 
 
 def floor_excess(names: Sequence[str], rows: Float, ceiling: Float) -> dict[str, Float]:
-    """How far the floor of each channel is above the loudest usual one.
+    """Excess of each channel's floor over the highest usual one.
 
     Parameters
     ----------
@@ -216,12 +216,12 @@ def floor_excess(names: Sequence[str], rows: Float, ceiling: Float) -> dict[str,
         Of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
     ceiling : numpy.ndarray [shape=(n_channels * n_bands,)]
-        Of :func:`fit_ceiling` [dB].
+        From :func:`fit_ceiling` [dB].
 
     Returns
     -------
     dict of str to numpy.ndarray [shape=(n,)]
-        By channel [dB]: in all but one band it is less.
+        Channel -> second largest excess over the bands [dB].
 
     Examples
     --------
@@ -238,13 +238,13 @@ def floor_excess(names: Sequence[str], rows: Float, ceiling: Float) -> dict[str,
 
 
 def loudest_floor(names: Sequence[str], rows: Float, ceiling: Float) -> Float:
-    """Excess of the noisiest channel [dB, shape=(n,)]; very low where none has a map."""
+    """Excess of the noisiest channel [dB, shape=(n,)]; very low if none has a map."""
     found = floor_excess(names, rows, ceiling)
     return np.asarray(np.max([np.full(len(rows), _NEVER), *found.values()], axis=0))
 
 
 def noisiest(names: Sequence[str], row: Float, ceiling: Float) -> NoiseFloor | None:
-    """Channel of a recording whose floor is the loudest beside the usual; None without a map.
+    """Channel of a recording with the largest excess of its floor; None without a map.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def noisiest(names: Sequence[str], row: Float, ceiling: Float) -> NoiseFloor | N
         Of the features.
     row : numpy.ndarray [shape=(n_features,)]
     ceiling : numpy.ndarray [shape=(n_channels * n_bands,)]
-        Of :func:`fit_ceiling` [dB].
+        From :func:`fit_ceiling` [dB].
     """
     found = floor_excess(names, row[None, :], ceiling)
     each = [NoiseFloor(channel, float(excess[0])) for channel, excess in found.items()]
@@ -260,11 +260,11 @@ def noisiest(names: Sequence[str], row: Float, ceiling: Float) -> NoiseFloor | N
 
 
 def usual_excess(excess: Float) -> float:
-    """Excess that all but :data:`NOISY_SHARE` of familiar recordings stay below [dB].
+    """Excess that only :data:`NOISY_SHARE` of familiar recordings reach [dB].
 
     Parameters
     ----------
     excess : numpy.ndarray [shape=(n,)]
-        Of machines that had no part in the ceiling, of :func:`loudest_floor` [dB].
+        From :func:`loudest_floor`, for machines not used for the ceiling [dB].
     """
     return max(float(np.quantile(excess, 1 - NOISY_SHARE, method="higher")), 0.0)

@@ -1,9 +1,9 @@
-"""Does a recording look like anything the model was trained on? A calibrated answer.
+"""Calibrated test of whether a recording resembles the training data.
 
-The distance is measured in the space of :mod:`wearstate.diagnose.feature_rows.physical`, where
-speed, load and the casing's resonances hardly count: another machine of the kind is near, another
-kind is far. It is the mean of a distance for each way of looking at a recording, so that a machine
-with one odd trait is nearer than one that is moderately odd in all of them.
+The distance is measured in the coordinates of :mod:`wearstate.diagnose.feature_rows.physical`,
+where speed, load and casing resonances matter little: another machine of the same kind is near,
+another kind is far. It is the mean of the distances in each kind of coordinates, so that a machine
+with one unusual property is nearer than one that is moderately unusual in all.
 """
 
 import math
@@ -22,63 +22,62 @@ from .quietness import UsualPeaks, fit_usual_peaks, shortfall
 Float = NDArray[np.float64]
 
 REACH = 1.2
-"""Another machine of the kind has its resonances within this factor of the known ones."""
+"""Factor within which other machines of the kind have their resonances."""
 
 NEVER_DB = 1e4
-"""No signal is so far below another."""
+"""More than any level difference."""
 
 _RARE = 0.99  # of familiar recordings
-_FEW = 0.03  # of the features: so many outside the trained range are not strange by themselves
+_FEW = 0.03  # share of features outside the trained range that is not suspicious
 
-_LEAST_SPREAD = 1e-6  # of the largest: a feature that never moves says nothing
-_CLIP = 10.0  # standard deviations: one wild feature must not stand for a strange recording
+_LEAST_SPREAD = 1e-6  # of the largest: bounds the spread of a constant feature
+_CLIP = 10.0  # standard deviations: limits the influence of a single feature
 _PROFILE = "profile"
 _ODD_PROFILE, _LESS_ODD = 1.2, 0.45
-"""Distance of a profile from which on other marks of the turn are tried, and how much nearer one
-must bring it. Of 340 unseen pumps a tenth lie as far, and another mark brings one of them nearer by
-0.33 at most; with a mark 20 degrees or more beside the dead centre it does by 0.5 to 3.3."""
+"""Distance of a profile from which other mark positions are tried, and the required reduction. Of
+340 unseen pumps a tenth lie as far, and another mark reduces the distance by at most 0.33; if the
+mark is 20 degrees or more off the dead centre, by 0.5 to 3.3."""
 
-_FREE = ("profile", "orders", "spiky", "orbit", "other")  # kinds that know of no hertz
+_FREE = ("profile", "orders", "spiky", "orbit", "other")  # kinds without absolute frequencies
 
 
 @dataclass(frozen=True, kw_only=True)
 class Familiarity:
-    """The cloud of the training recordings in physical space.
+    """Distribution of the training recordings in physical coordinates.
 
     Attributes
     ----------
     centre, spread : numpy.ndarray [shape=(n_physical,)]
         Mean and standard deviation of each coordinate.
     whiten : numpy.ndarray [shape=(n_physical, n_physical)]
-        Turns the standardised coordinates of each kind into independent ones of variance one over
-        their number; kinds stay apart.
+        Transforms the standardised coordinates of each kind into uncorrelated ones with variance
+        one over their number, separately for each kind.
     machines : numpy.ndarray [shape=(n_machines, n_physical)]
-        Mean of each machine draw in these.
+        Mean of each machine draw in the whitened coordinates.
     groups : numpy.ndarray [shape=(n_machines,)]
         Numbers of these draws.
     low, high : numpy.ndarray [shape=(n_features,)]
-        Least and largest value of each feature in training.
+        Smallest and largest value of each feature in training.
     weight : float
-        Distance that stands for all features outside that range: a machine may be near in all
-        coordinates and still show cells of its map that no training machine ever did.
+        Distance assigned to all features outside that range: a machine may be near in all
+        coordinates and yet have cells of its map that no training machine has.
     seldom_outside : float
         Share of the features outside that range that few familiar recordings exceed.
     usual_peak, peak_slope : numpy.ndarray [shape=(n_channels,)]
-        Of :class:`~.quietness.UsualPeaks`.
+        As in :class:`~.quietness.UsualPeaks`.
     most_lacking : float
-        How far familiar peaks may be below the usual ones [dB]; :data:`NEVER_DB` where that was
-        not asked.
-        A machine that does not knock is near in shape, and still none of the trained ones.
+        Limit of the shortfall of peaks [dB]; :data:`NEVER_DB` if not applied. A machine that does
+        not knock may be near in shape, and is still unlike the trained ones.
     seldom_lacking : float
-        How far few familiar peaks are below the usual ones [dB].
+        Shortfall of peaks that few familiar recordings exceed [dB].
     floor_ceiling : numpy.ndarray [shape=(n_channels * n_bands,)]
-        Of :func:`~.noise_floor.fit_ceiling` [dB].
+        From :func:`~.noise_floor.fit_ceiling` [dB].
     most_noise : float
-        How far the noise floor of few familiar recordings is above that ceiling [dB].
+        Excess of the noise floor over that ceiling that few familiar recordings exceed [dB].
     least_noise : numpy.ndarray [shape=(n_levels,)]
-        Of :func:`~.noise_floor.fit_least` [dB].
+        From :func:`~.noise_floor.fit_least` [dB].
     top_offset, top_slope, most_top_lacking : numpy.ndarray [shape=(n_channels,)]
-        Of :class:`~.bandwidth.UsualTops`.
+        As in :class:`~.bandwidth.UsualTops`.
     """
 
     centre: Float
@@ -103,23 +102,23 @@ class Familiarity:
 
     @property
     def tops(self) -> UsualTops:
-        """What the highest band of a channel is to be."""
+        """Expected level of the highest band of each channel."""
         return UsualTops(self.top_offset, self.top_slope, self.most_top_lacking)
 
     def lacking(self, names: Sequence[str], rows: Float) -> Float:
-        """How far peaks are below the usual ones [dB, shape=(n_recordings,)]."""
+        """Shortfall of peaks relative to the usual ones [dB, shape=(n_recordings,)]."""
         return shortfall(names, rows, UsualPeaks(self.usual_peak, self.peak_slope))
 
     def noise(self, names: Sequence[str], rows: Float) -> Float:
-        """How far noise floors are above the loudest usual ones [dB, shape=(n_recordings,)]."""
+        """Excess of noise floors over the highest usual ones [dB, shape=(n_recordings,)]."""
         return loudest_floor(names, rows, self.floor_ceiling)
 
     def outside(self, rows: Float) -> Float:
-        """Share of the features outside what was trained on [shape=(n_recordings,)]."""
+        """Share of the features outside the trained range [shape=(n_recordings,)]."""
         return np.asarray(((rows < self.low) | (rows > self.high)).mean(axis=1))
 
     def farthest_outside(self, row: Float) -> NDArray[np.intp]:
-        """Features of one recording outside the trained range, in spans of it the farthest first.
+        """Features of one recording outside the trained range, the farthest first in units of it.
 
         Parameters
         ----------
@@ -128,35 +127,34 @@ class Familiarity:
         Returns
         -------
         numpy.ndarray of int
-            Their places.
+            Indices of the features.
         """
         beyond = np.maximum(self.low - row, row - self.high)
-        least = _LEAST_SPREAD * np.maximum(np.abs(self.high), 1.0)  # of one that never moves
+        least = _LEAST_SPREAD * np.maximum(np.abs(self.high), 1.0)  # for a constant feature
         span = np.maximum(self.high - self.low, least)
         order = np.argsort(-beyond / span, kind="stable")
         return order[beyond[order] > 0]
 
     def distance(self, names: Sequence[str], rows: Float) -> Float:
-        """Distance of recordings from the cloud: about 1 for a training recording.
+        """Distance of recordings from the training data: about 1 for a training recording.
 
         Parameters
         ----------
         names : sequence of str
-            Of the features.
+            Names of the features.
         rows : numpy.ndarray [shape=(n_recordings, n_features)]
 
         Returns
         -------
         numpy.ndarray [shape=(n_recordings,)]
-            Mean over the kinds of coordinates of the root mean square in each, every coordinate in
-            the spread it has once the others of its kind are known (Mahalanobis); or the weighted
-            share of features outside the trained range, where that is more.
+            Mean over the kinds of coordinates of the rms Mahalanobis distance in each; or the
+            weighted share of features outside the trained range, if larger.
         """
         near = self.by_kind(names, rows).mean(axis=1)
         return np.asarray(np.maximum(near, self.weight * self.outside(rows)))
 
     def by_kind(self, names: Sequence[str], rows: Float) -> Float:
-        """Distance of recordings in each kind of coordinates, of :func:`kinds_of`.
+        """Distance of recordings in each kind of coordinates, in the order of :func:`kinds_of`.
 
         Returns
         -------
@@ -165,39 +163,39 @@ class Familiarity:
         return _lengths(names, self._place(names, rows))
 
     def nearest(self, names: Sequence[str], row: Float) -> tuple[int, float]:
-        """Machine draw nearest to a recording, and how far it is, as :meth:`distance`."""
-        apart = _lengths(names, self.machines - self._place(names, row[None, :])).mean(axis=1)
-        best = int(np.argmin(apart))
-        return int(self.groups[best]), float(apart[best])
+        """Machine draw nearest to a recording, and its distance as in :meth:`distance`."""
+        distances = _lengths(names, self.machines - self._place(names, row[None, :])).mean(axis=1)
+        best = int(np.argmin(distances))
+        return int(self.groups[best]), float(distances[best])
 
     def late_mark(self, names: Sequence[str], row: Float, limit: float) -> float | None:
-        """By how much the mark of the turn comes late in a recording that is familiar but for that.
+        """Delay of the once-per-turn mark in a recording that is otherwise familiar.
 
         Parameters
         ----------
         names : sequence of str
-            Of the features.
+            Names of the features.
         row : numpy.ndarray [shape=(n_features,)]
         limit : float
-            Distance at which the familiar ends.
+            Distance beyond which a recording is unfamiliar.
 
         Returns
         -------
         float or None
-            [deg], from -180 on; None where the energy lies in the turn about where it does in
-            training, or no other mark brings it there.
+            [deg], >= -180; None if the energy over the revolution is distributed as in training,
+            or no other mark achieves this.
         """
         kinds = list(kinds_of(tuple(names)))
-        if _PROFILE not in kinds or self._odd(names, row[None, :])[0] < _ODD_PROFILE:
+        if _PROFILE not in kinds or self._profile_distance(names, row[None, :])[0] < _ODD_PROFILE:
             return None
         turned = turned_rows(names, row)
-        odd = self._odd(names, turned)
+        odd = self._profile_distance(names, turned)
         best = int(np.argmin(odd))
         near = odd[0] - odd[best] > _LESS_ODD and self.distance(names, turned[[best]])[0] < limit
         return math.remainder(360 * best / len(turned), 360) if near else None
 
-    def _odd(self, names: Sequence[str], rows: Float) -> Float:
-        """Distance of recordings by where their energy lies in the turn."""
+    def _profile_distance(self, names: Sequence[str], rows: Float) -> Float:
+        """Distance of recordings in the distribution of energy over the revolution."""
         return self.by_kind(names, rows)[:, list(kinds_of(tuple(names))).index(_PROFILE)]
 
     def _place(self, names: Sequence[str], rows: Float) -> Float:
@@ -206,20 +204,20 @@ class Familiarity:
 
 
 def free_distance(names: Sequence[str], by_kind: Float) -> float:
-    """Distance of one recording by what hangs on no sample rate.
+    """Distance of one recording in coordinates that do not depend on the sample rate.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     by_kind : numpy.ndarray [shape=(n_kinds,)]
-        Of :meth:`Familiarity.by_kind`.
+        From :meth:`Familiarity.by_kind`.
 
     Returns
     -------
     float
-        As :meth:`Familiarity.distance`, but for the bands, which are lost where a rate was too low;
-        NaN where the model has nothing else.
+        As :meth:`Familiarity.distance`, without the bands, which are missing if a rate was too low;
+        NaN if the model has no other coordinates.
 
     Examples
     --------
@@ -245,7 +243,7 @@ def kinds_of(names: tuple[str, ...]) -> dict[str, NDArray[np.intp]]:
 
 @lru_cache(maxsize=16)
 def _members(names: tuple[str, ...]) -> Float:
-    """One where a coordinate is of a kind [shape=(n_physical, n_kinds)]."""
+    """Indicator of the kind of each coordinate [shape=(n_physical, n_kinds)]."""
     kinds = coordinates_of(names).kind
     return np.asarray(kinds[:, None] == list(kinds_of(names)), dtype=np.float64)
 
@@ -270,31 +268,30 @@ def fit_familiarity(
     seldom_lacking: float = NEVER_DB,
     most_noise: float = NEVER_DB,
 ) -> Familiarity:
-    """Learn the cloud of training recordings.
+    """Fit the distribution of training recordings.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     rows : numpy.ndarray [shape=(n_recordings, n_features)]
         At least three recordings.
     groups : numpy.ndarray [shape=(n_recordings,)]
-        Machine draw of each.
+        Machine draw of each recording.
     weight : float
-        Of the share of features outside the trained range; 0: it does not count.
+        Weight of the share of features outside the trained range; 0: not used.
     seldom_outside : float
         Share of the features outside the trained range that few familiar recordings exceed.
     most_lacking, seldom_lacking : float
-        How far familiar peaks may be, and few are, below the usual ones [dB].
+        Limit of the shortfall of peaks, and shortfall that few familiar recordings exceed [dB].
     most_noise : float
-        How far noise floors of few familiar recordings are above the loudest usual ones [dB].
+        Excess of noise floors over the highest usual ones that few familiar recordings exceed [dB].
 
     Returns
     -------
     Familiarity
-        The covariance of each kind of coordinates, shrunk as far as so few recordings ask for, and
-        widened by what the spectra of the same machines would show with their resonances anywhere
-        up to a fifth off.
+        Covariance of each kind of coordinates, shrunk according to the number of recordings, and
+        widened by the effect of shifting the resonances of the same machines by up to a fifth.
 
     References
     ----------
@@ -316,10 +313,10 @@ def fit_familiarity(
     spread = np.maximum(spread, _LEAST_SPREAD * max(float(spread.max()), 1.0))
     standard = _standardised(values, centre, spread)
     whiten = np.zeros_like(tolerance)
-    for here in kinds_of(tuple(names)).values():
-        block = np.ix_(here, here)
-        scale = np.outer(spread[here], spread[here])
-        whiten[block] = _whitening(standard[:, here], tolerance[block] / scale)
+    for own in kinds_of(tuple(names)).values():
+        block = np.ix_(own, own)
+        scale = np.outer(spread[own], spread[own])
+        whiten[block] = _whitening(standard[:, own], tolerance[block] / scale)
     machines, place = np.unique(groups, return_inverse=True)
     means = np.zeros((len(machines), standard.shape[1]))
     np.add.at(means, place, standard @ whiten)
@@ -347,22 +344,21 @@ def fit_familiarity(
     )
 
 
-def outside_weight(apart: Float, outside: Float) -> tuple[float, float]:
-    """What features outside the trained range count beside the distance in the others.
+def outside_weight(distance: Float, outside: Float) -> tuple[float, float]:
+    """Weight of features outside the trained range, relative to the distance in the others.
 
     Parameters
     ----------
-    apart, outside : numpy.ndarray [shape=(n_recordings,)]
-        Distance, and share of the features outside, of familiar recordings whose machines had no
-        part in the cloud.
+    distance, outside : numpy.ndarray [shape=(n_recordings,)]
+        Distance, and share of the features outside, of familiar recordings whose machines were not
+        used in the fit.
 
     Returns
     -------
     weight : float
-        Of the share: where one recording in a hundred has more outside, it makes so much as far as
-        the hundredth is in distance. Three per cent of the features count no more than that: of
-        more training records familiar ones have fewer outside, while other machines of the kind
-        have as many as before, and are estimated no worse.
+        Ratio of the 99th percentiles of distance and share, with a share of at least three per
+        cent: with more training records, familiar ones have fewer features outside, while other
+        machines of the kind have as many as before and are estimated as well.
     seldom : float
         Share that one familiar recording in a hundred exceeds.
 
@@ -374,20 +370,21 @@ def outside_weight(apart: Float, outside: Float) -> tuple[float, float]:
     [33.0, 0.06]
     [66.0, 0.01]
     """
-    far, seldom = (float(np.quantile(each, _RARE)) for each in (apart, outside))
+    far, seldom = (float(np.quantile(each, _RARE)) for each in (distance, outside))
     return far / max(seldom, _FEW), seldom
 
 
 def _tolerance(names: Sequence[str], rows: Float, values: Float) -> Float:
-    """Covariance of what moving the spectra does, each by a factor uniform within the reach."""
+    """Covariance of the effect of shifting spectra by a factor that is uniform within REACH."""
     moves = [
         physical_rows(names, moved_rows(names, rows, factor)) - values
         for factor in (1 / REACH, REACH)
     ]
     owner = coordinates_of(names).owner
-    alone = owner[:, None] == owner  # every place has resonances of its own
-    # of a uniform distribution the variance is a third of the square at its ends
-    return np.asarray(alone * sum(move.T @ move for move in moves) / (3 * len(moves) * len(rows)))
+    same_owner = owner[:, None] == owner  # every position has resonances of its own
+    # the variance of a uniform distribution is a third of the square at its ends
+    total = sum(move.T @ move for move in moves)
+    return np.asarray(same_owner * total / (3 * len(moves) * len(rows)))
 
 
 def _whitening(standard: Float, tolerance: Float) -> Float:
@@ -403,9 +400,9 @@ def novelty_p_value(distance: float, calibration: Float) -> float:
     Parameters
     ----------
     distance : float
-        Of the recording in question.
+        Distance of the recording to be tested.
     calibration : numpy.ndarray [shape=(n,)]
-        Distances of recordings that the cloud was not fitted on.
+        Distances of recordings not used in the fit.
 
     Returns
     -------
@@ -415,9 +412,9 @@ def novelty_p_value(distance: float, calibration: Float) -> float:
 
     Notes
     -----
-    Here the calibration is out of fold: its clouds were fitted on four fifths of the machine
-    draws, the recording's on all of them, which makes p slightly too large, so that a few less
-    familiar recordings are refused than alpha says.
+    The calibration is out of fold: it uses fits to four fifths of the machine draws, the recording
+    a fit to all of them. This makes p slightly too large, so that slightly fewer familiar
+    recordings are refused than alpha.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""How far a recording's peaks lie below those usual of the trained machines at its speed."""
+"""Shortfall of a recording's peaks relative to those of the trained machines at its speed."""
 
 import math
 from collections.abc import Sequence
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 REFUSED_SHARE, CAUTIONED_SHARE = 0.005, 0.02
-"""Of familiar recordings: that may be refused as too quiet, half of that for their distance; and
-that may be cautioned for it."""
+"""Share of familiar recordings that may be refused as too quiet, half of it due to their distance,
+and share that may get a caution."""
 
 _PEAK, _SPEED = ".peak", "shaft.speed_hz"
 _SILENCE = 1e-30  # of a channel without any signal
-_LEAST_SPAN = 0.01  # of the logarithm of the speed: less is one speed
+_LEAST_SPAN = 0.01  # of the logarithm of the speed: smaller spans count as constant speed
 
 
 class UsualPeaks(NamedTuple):
-    """Line of the usual peak of each channel over the speed.
+    """Usual peak of each channel as a line over the logarithm of the speed.
 
     Attributes
     ----------
     level : numpy.ndarray [shape=(n_channels,)]
-        At 1 Hz, or at any speed where the slope is 0 [dB re 1 x].
+        Level at 1 Hz, or at any speed if the slope is 0 [dB re 1 x].
     slope : numpy.ndarray [shape=(n_channels,)]
-        For a speed e times as high [dB].
+        Increase when the speed grows by a factor e [dB].
     """
 
     level: Float
@@ -45,18 +45,18 @@ def peak_channels(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def fit_usual_peaks(names: Sequence[str], rows: Float) -> UsualPeaks:
-    """Median of the peaks along the speed.
+    """Fit the median of the peaks as a function of the speed.
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
 
     Returns
     -------
     UsualPeaks
-        Least absolute deviations: a few machines that run wild move no median.
+        Least absolute deviations, robust against a few outliers.
 
     References
     ----------
@@ -83,12 +83,12 @@ def fit_usual_peaks(names: Sequence[str], rows: Float) -> UsualPeaks:
 
 
 def shortfall(names: Sequence[str], rows: Float, usual: UsualPeaks) -> Float:
-    """How far the quietest channel is below its usual peak [dB, shape=(n,)]; never less than 0.
+    """Shortfall of the quietest channel relative to its usual peak, >= 0 [dB, shape=(n,)].
 
     Parameters
     ----------
     names : sequence of str
-        Of the features.
+        Names of the features.
     rows : numpy.ndarray [shape=(n, n_features)]
     usual : UsualPeaks
 
@@ -104,19 +104,19 @@ def shortfall(names: Sequence[str], rows: Float, usual: UsualPeaks) -> Float:
 
 
 def most_lacking(lacking: Float, share: float) -> float:
-    """How far peaks of familiar machines may be below the usual ones [dB].
+    """Limit of the shortfall of peaks of familiar machines [dB].
 
     Parameters
     ----------
     lacking : numpy.ndarray [shape=(n,)]
-        Of machines that had no part in the fit [dB].
+        Shortfall of machines not used in the fit [dB].
     share : float
-        Of familiar machines that may be further below.
+        Share of familiar machines that may exceed the limit.
 
     Returns
     -------
     float
-        The largest where there are too few machines to tell so small a share.
+        The largest shortfall if there are too few machines for such a small share.
 
     Examples
     --------
@@ -128,13 +128,13 @@ def most_lacking(lacking: Float, share: float) -> float:
 
 
 def _peaks(names: Sequence[str], rows: Float) -> Float:
-    """[dB re 1 x, shape=(n, n_channels)]."""
+    """Peak levels [dB re 1 x, shape=(n, n_channels)]."""
     columns = [i for i, name in enumerate(names) if name.endswith(_PEAK)]
     return np.asarray(20 * np.log10(np.maximum(rows[:, columns], _SILENCE)))
 
 
 def _log_speed(names: Sequence[str], rows: Float) -> Float:
-    """Of every row; 0 without a speed."""
+    """Logarithm of the speed of every row; 0 without a speed."""
     if _SPEED not in names:
         return np.zeros(len(rows))
     return np.asarray(np.log(np.maximum(rows[:, list(names).index(_SPEED)], _SILENCE)))

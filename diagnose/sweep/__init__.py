@@ -1,4 +1,4 @@
-"""Runs of a scene over a range of values: what each makes of the machine.
+"""Parameter sweeps of a scene: runs over a range of values, and detectable changes.
 
 It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
 ``sim.fidelity``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,

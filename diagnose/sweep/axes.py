@@ -16,10 +16,10 @@ from ..charts.words import effect_words
 from ..pages.si_text import plain
 
 MOST_AXES = 3
-"""Of a sweep: the last is the change that is looked for, those before it are conditions."""
+"""Largest number of axes: the last is the change to be detected, the others are conditions."""
 
 MOST_POINTS = 10_000
-"""Of the grid."""
+"""Largest number of points of the grid."""
 
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _RANGE = re.compile(rf"({_NUMBER})\s*(.*?)\.\.\s*({_NUMBER})(?:/([0-9]+))?\s*(.*?)(?:/([0-9]+))?")
@@ -28,7 +28,7 @@ _FEWEST = 2
 
 
 class SweepError(ValueError):
-    """Every fault of what a sweep was asked for, one line each."""
+    """All faults of the request for a sweep, one line each."""
 
     def __init__(self, faults: Sequence[str]) -> None:
         self.faults = list(dict.fromkeys(faults))
@@ -44,11 +44,11 @@ class Axis:
     path : str
         Dotted path in the scene.
     numbers : tuple of float
-        As given, in `unit`.
+        Values as given, in `unit`.
     unit : str
-        Empty where bare numbers were given: then they are SI.
+        Unit as given; empty for bare numbers, which are SI.
     values : tuple of float
-        The same in SI; empty until the scene has read them.
+        Values in SI; empty until the scene has been read.
     si_unit : str
     """
 
@@ -71,13 +71,13 @@ class Axis:
 
     @property
     def scale(self) -> float:
-        """SI over the unit as given."""
+        """Factor from the unit as given to SI."""
         pairs = zip(self.numbers, self.values, strict=True)
         return next((value / number for number, value in pairs if number and value), 1.0)
 
     @property
     def words(self) -> str:
-        """What it is, for a sentence: ``crank pin diametral clearance``.
+        """Name for a sentence: ``crank pin diametral clearance``.
 
         Examples
         --------
@@ -102,14 +102,14 @@ def parse_axis(text: str, points: int = 5) -> Axis:
     Parameters
     ----------
     text : str
-        A unit stands once at the end, or after each number.
+        The unit is given once at the end, or after each number.
     points : int
-        Of a range that does not say how many.
+        Number of points of a range without its own.
 
     Raises
     ------
     SweepError
-        It cannot be read, holds one value only, or values that neither rise nor fall.
+        The text cannot be read, has only one value, or values that neither rise nor fall.
 
     Examples
     --------
@@ -142,8 +142,8 @@ def _read(path: str, text: str, points: int) -> tuple[list[float], list[str]]:
         found = _RANGE.fullmatch(text)
         if found is None:
             raise SweepError([f"{path} = {text} must read A..B or A..B/N, with a unit at the end"])
-        low, first, high, told, last, at_end = found.groups()
-        count = int(told or at_end or points)
+        low, first, high, inside, last, at_end = found.groups()
+        count = int(inside or at_end or points)
         if not _FEWEST <= count <= MOST_POINTS:
             fault = f"{path} = {text} has {count} points, must have {_FEWEST} to {MOST_POINTS}"
             raise SweepError([f"{fault}; give another number after the slash"])
@@ -155,16 +155,16 @@ def _read(path: str, text: str, points: int) -> tuple[list[float], list[str]]:
         raise SweepError(
             [f"{path}: {', '.join(map(repr, bad))} must be a number; a unit may follow"]
         )
-    told_units = [entry for entry in entries if entry is not None]
-    return [float(e[1]) for e in told_units], [e[2].strip() for e in told_units]
+    matches = [entry for entry in entries if entry is not None]
+    return [float(e[1]) for e in matches], [e[2].strip() for e in matches]
 
 
 Point = tuple[int, ...]
-"""Which value of each axis."""
+"""Index of the value of each axis."""
 
 
 def grid(axes: Sequence[Axis]) -> Iterator[Point]:
-    """Every combination, the last axis fastest."""
+    """All combinations, with the last axis varying fastest."""
     return itertools.product(*(range(len(axis.numbers)) for axis in axes))
 
 
@@ -178,18 +178,18 @@ def read_axes(
     subject : str
         Built-in scene, or file.
     given : mapping of str to object
-        Values that replace its own at every point.
+        Values that replace those of the scene at every point.
     texts : sequence of str
-        As of :func:`parse_axis`.
+        As in :func:`parse_axis`.
     points : int
-        Of a range that does not say how many.
+        Number of points of a range without its own.
 
     Raises
     ------
     SweepError
-        Axes that cannot be read, are no numbers of the scene, or are refused by it; all at once.
+        An axis cannot be read, is not a number of the scene, or is rejected by it; all at once.
     SceneError
-        The scene itself is at fault.
+        The scene itself is invalid.
     """
     load_scene(subject, given)
     table = scene_table(scene_text(subject), subject)
@@ -199,9 +199,9 @@ def read_axes(
     faults += _clashes([axis.path for axis in axes], given)
     sound = []
     for axis in axes:
-        told = _alone(subject, given, axis)
-        faults += told
-        if not told:
+        own = _axis_faults(subject, given, axis)
+        faults += own
+        if not own:
             sound.append(axis)
     if faults:
         raise SweepError(faults)
@@ -235,14 +235,14 @@ def _clashes(paths: Sequence[str], given: Mapping[str, Any]) -> list[str]:
     ]
     faults += [f"{path} is both set and swept; leave one out" for path in paths if path in given]
     if "drive.start_angle" in paths:
-        faults.append("drive.start_angle is what starts differ in; use --starts")
+        faults.append("drive.start_angle already differs between starts; use --starts")
     if len(paths) > MOST_AXES:
         faults.append(f"{len(paths)} axes are swept, must be <= {MOST_AXES}; fix some by --set")
     return faults
 
 
-def _alone(subject: str, given: Mapping[str, Any], axis: Axis) -> list[str]:
-    """What is wrong with the values of one axis."""
+def _axis_faults(subject: str, given: Mapping[str, Any], axis: Axis) -> list[str]:
+    """Faults of the values of one axis."""
     faults: list[str] = []
     for i in range(len(axis.numbers)):
         try:
@@ -251,12 +251,12 @@ def _alone(subject: str, given: Mapping[str, Any], axis: Axis) -> list[str]:
             faults += error.faults
             continue
         if isinstance(value, bool) or not isinstance(value, int | float):
-            faults.append(f"{axis.path} is no number of the scene; sweep a number")
+            faults.append(f"{axis.path} is not a number of the scene; sweep a number")
     return faults
 
 
 def _in_si(axis: Axis, place: int, scenes: Mapping[Point, Scene]) -> Axis:
-    """With the values as the scene read them."""
+    """Axis with its values in SI, as read by the scene."""
     found = {point[place]: value_at(scene, axis.path) for point, scene in scenes.items()}
     return Axis(
         path=axis.path,

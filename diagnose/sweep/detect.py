@@ -1,4 +1,4 @@
-"""Smallest change that stands out of the scatter between recordings."""
+"""Smallest change that is detectable in the scatter between recordings."""
 
 import math
 from collections.abc import Sequence
@@ -13,27 +13,26 @@ from scipy.special import stdtrit
 
 Float = NDArray[np.float64]
 
-_ROUNDING = 1e-9  # of the values: no scatter is smaller
+_ROUNDING = 1e-9  # of the values: lower bound of the threshold
 
 
 @dataclass(frozen=True, kw_only=True)
 class Detection:
-    """How a quantity answers to one number of the scene.
+    """Response of a quantity to one number of the scene.
 
     Attributes
     ----------
     change : float
-        Smallest change from the first value that is told [unit of x]; infinite where the whole
-        axis is not enough, NaN where scatter is not known.
+        Smallest detectable change from the first value [unit of x]; infinite if beyond the axis,
+        NaN if the scatter is unknown.
     threshold : float
-        Difference of the quantity that is told [unit of y]; NaN where scatter is not known.
+        Detectable difference of the quantity [unit of y]; NaN if the scatter is unknown.
     scatter : float
         Standard deviation between recordings at one value, pooled [unit of y].
     freedom : int
-        Degrees of freedom of that.
+        Degrees of freedom of the scatter.
     slope, slope_error : float
-        Of the straight line by least squares through all recordings [unit of y / unit of x], and
-        its standard error.
+        Least-squares slope through all recordings [unit of y / unit of x], and its standard error.
     rises : bool
         Whether the quantity is larger at the last value than at the first.
     """
@@ -47,23 +46,23 @@ class Detection:
     rises: bool
 
     @property
-    def told(self) -> bool:
-        """Whether a change within the axis is told."""
+    def detected(self) -> bool:
+        """Whether a change within the axis is detectable."""
         return math.isfinite(self.change)
 
 
 def detect(x: Sequence[float], samples: Sequence[ArrayLike], confidence: float = 0.95) -> Detection:
-    """Smallest change of `x` that one recording tells against those at the first value.
+    """Smallest change of `x` that one recording reveals, compared with those at the first value.
 
     Parameters
     ----------
     x : sequence of float, length n
         Values of an axis, rising or falling.
     samples : sequence of array_like, length n
-        Values of the quantity in the recordings at each; a value without any is left out.
+        Values of the quantity in the recordings at each value; empty ones are left out.
     confidence : float
-        A share of ``1 - confidence`` of unchanged machines is wrongly called changed (two-sided),
-        and `confidence` of those with the change are found, 0.5 to 1.
+        Share of changed machines that is detected, 0.5 to 1; ``1 - confidence`` is the share of
+        false alarms (two-sided).
 
     Returns
     -------
@@ -71,13 +70,13 @@ def detect(x: Sequence[float], samples: Sequence[ArrayLike], confidence: float =
 
     Notes
     -----
-    A recording stands out where it differs from the mean of the n recordings at the first value by
-    more than ``t(1 - a/2) s sqrt(1 + 1/n)``, with `s` pooled over the axis and Student's t of its
-    degrees of freedom; a change is found with probability ``1 - a`` where the mean differs by
-    ``t(1 - a) s sqrt(1 + 1/n)`` more. Means are interpolated by monotone cubics (Fritsch, Carlson),
-    and the change counts from which on every larger one stands out in the same direction. Scatter
-    is taken as normal and the same along the axis. The noncentral distribution is approximated by
-    the shifted one, which is good from some six degrees of freedom.
+    A change is detected if a recording differs from the mean of the n recordings at the first value
+    by more than ``t(1 - a/2) s sqrt(1 + 1/n)``, with `s` pooled over the axis and Student's t for
+    its degrees of freedom. This happens with probability ``1 - a`` if the mean differs by
+    ``t(1 - a) s sqrt(1 + 1/n)`` more. Means are interpolated by monotone cubics (Fritsch, Carlson);
+    the result is the change from which all larger ones are detectable in the same direction.
+    Scatter is assumed normal and constant along the axis. The noncentral distribution is
+    approximated by the shifted one, accurate from about six degrees of freedom.
 
     References
     ----------
@@ -132,7 +131,7 @@ def _pooled(rows: Sequence[Float]) -> tuple[float, int]:
 
 
 def _line(x: Float, rows: Sequence[Float]) -> tuple[float, float]:
-    """Slope and its standard error; the latter NaN of two values."""
+    """Slope and its standard error, which is NaN for two values."""
     places = np.repeat(x, [row.size for row in rows])
     values = np.concatenate(rows)
     about = places - places.mean()
@@ -145,7 +144,7 @@ def _line(x: Float, rows: Sequence[Float]) -> tuple[float, float]:
 
 
 def _crossing(away: Float, differences: Float, threshold: float) -> float:
-    """Where differences pass a threshold for good: infinite where they do not."""
+    """Change from which differences stay above a threshold; infinite if they do not."""
     if not math.isfinite(threshold):
         return math.nan
     size = np.sign(differences[-1]) * differences  # grows towards the far end

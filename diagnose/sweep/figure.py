@@ -12,14 +12,14 @@ from .sweep import Row, Sweep
 from .text import best_rows, setting_words
 
 MOST_PANELS = 8
-"""And that of the smallest changes."""
+"""Largest number of quantities, in addition to the panel of smallest changes."""
 
 _MOST_LINES = 6  # quantities in the panel of smallest changes
 _COLUMNS = 3
 
 
 def sweep_figure(sweep: Sweep) -> Any:
-    """Quantities along the last axis, with the scatter between starts; what tells a change first.
+    """Quantities along the last axis with scatter between starts, the most sensitive first.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def sweep_figure(sweep: Sweep) -> Any:
 
     rows = sweep.rows()
     names = panel_names(sweep, rows)
-    summary = len(sweep.plan.axes) > 1 and any(row.detection.told for row in rows)
+    summary = len(sweep.plan.axes) > 1 and any(row.detection.detected for row in rows)
     count = len(names) + summary
     columns = min(_COLUMNS, count)
     high = math.ceil(count / columns)
@@ -58,7 +58,7 @@ def sweep_images(sweep: Sweep) -> list[PageImage]:
     rows = sweep.rows()
     names = panel_names(sweep, rows)
     images = []
-    if len(sweep.plan.axes) > 1 and any(row.detection.told for row in rows):
+    if len(sweep.plan.axes) > 1 and any(row.detection.detected for row in rows):
         images.append(drawn_alone(lambda axes: _draw_changes(axes, sweep, rows)))
     for name in names:
         shown = [row for row in rows if row.shown.name == name]
@@ -73,11 +73,11 @@ def _draw_with_legend(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
         axes.legend(fontsize=8, framealpha=0.6, ncols=1 + (len(labels) > _ONE_COLUMN))
 
 
-_ONE_COLUMN = 4  # settings in a legend; more stand in two
+_ONE_COLUMN = 4  # most settings in one column of a legend
 
 
 def panel_names(sweep: Sweep, rows: list[Row]) -> list[str]:
-    """Quantities that tell the smallest changes first, those of the conclusion among them."""
+    """Quantities in order of sensitivity, those of the conclusion first."""
     least: dict[str, float] = {}
     for row in rows:
         change = row.detection.change
@@ -89,7 +89,7 @@ def panel_names(sweep: Sweep, rows: list[Row]) -> list[str]:
 
 
 def _draw_quantity(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
-    """One line for every setting; bars are one standard deviation between starts."""
+    """Draw one line per setting; bars are one standard deviation between starts."""
     from matplotlib import colormaps
 
     axis = sweep.plan.axes[-1]
@@ -108,8 +108,8 @@ def _draw_quantity(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
             label=label,
         )
     shown = rows[0].shown
-    aside = "" if shown.seen else " *"
-    axes.set_title(short_name(shown.name, 40) + aside, fontsize=10)
+    mark = "" if shown.seen else " *"
+    axes.set_title(short_name(shown.name, 40) + mark, fontsize=10)
     unit = f" [{shown.unit}]" if shown.unit else ""
     axes.set_ylabel(f"{short_name(shown.words, 44)}{unit}".strip(), fontsize=8)
     axes.set_xlabel(f"{axis.words} [{axis.unit or axis.si_unit or '-'}]", fontsize=9)
@@ -118,7 +118,7 @@ def _draw_quantity(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
 
 
 def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
-    """Smallest change that is told, over the settings."""
+    """Draw the smallest detectable change over the settings."""
     settings, axis = sweep.settings, sweep.plan.axes[-1]
     single = len(sweep.plan.axes) == 2
     places = list(sweep.plan.axes[0].numbers) if single else list(range(len(settings)))

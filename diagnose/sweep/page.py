@@ -1,4 +1,4 @@
-"""Page of a sweep, and the forms in which it is written."""
+"""Page of a sweep, and its output formats."""
 
 import math
 from pathlib import Path
@@ -27,20 +27,20 @@ _CELL_BYTES = 120  # of the table
 
 
 def sweep_html(sweep: Sweep, *, interactive: bool = False) -> str:
-    """One self-contained page: conclusion, picture, table.
+    """A self-contained page: conclusion, picture, table.
 
     Parameters
     ----------
     sweep : Sweep
     interactive : bool
-        Curves to zoom in, whose points tell their settings.
+        Make the curves interactive, with points that show their settings.
 
     Returns
     -------
     str
     """
     axis, rows = sweep.plan.axes[-1], sweep.rows()
-    best = {(row.setting, row.shown.name) for row in best_rows(sweep) if row.detection.told}
+    best = {(row.setting, row.shown.name) for row in best_rows(sweep) if row.detection.detected}
     panels = min(len(sweep.plan.shown), MOST_PANELS)
     images = sweep_images(sweep)
     block = None
@@ -88,7 +88,7 @@ def _cell(row: Row, i: int) -> str:
 
 
 def save_sweep(sweep: Sweep, path: Path, *, force: bool = True, interactive: bool = False) -> None:
-    """Write a sweep in the form that the suffix asks for, whole or not at all.
+    """Write a sweep in the format of the suffix, atomically.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def save_sweep(sweep: Sweep, path: Path, *, force: bool = True, interactive: boo
     force : bool
         Replace an existing file.
     interactive : bool
-        As of :func:`sweep_html`; of no matter to other forms.
+        As in :func:`sweep_html`; ignored by other formats.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Curves of a sweep for a page to zoom in: means between starts, and the settings of each."""
+"""Interactive curves of a sweep: means over starts, and the settings of each."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ _COLOURS = ("#1f5a94", "#e07b39", "#3a923a", "#b3261e", "#7b5ea7", "#8c6d31", "#
 
 
 def sweep_points(sweep: Sweep) -> list[PointAxes]:
-    """Axes of the quantities that show the smallest changes, along the last axis of the sweep.
+    """Axes of the most sensitive quantities along the last axis of the sweep.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Quantities that a sweep shows: features of the sensors, and what the simulator alone knows."""
+"""Quantities shown by a sweep: features of the sensors, and quantities of the simulator."""
 
 import difflib
 import fnmatch
@@ -12,7 +12,7 @@ from ...sim.output.recording import Recording
 from .axes import SweepError
 
 MOST_SHOWN = 200
-"""Quantities of a sweep."""
+"""Largest number of quantities of a sweep."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,15 +22,15 @@ class Shown:
     Attributes
     ----------
     name : str
-        Of a value of the feature catalogue, or of
+        Name of a value of the feature catalogue, or from
         :func:`wearstate.datasets.generation.truths.truths_of`.
     words : str
-        In full, bands with their hertz.
+        Full description, with the frequencies of bands.
     unit : str
     seen : bool
-        Computed from the sensors' signals; what is not is known to the simulator alone.
+        Computed from the sensors' signals; otherwise known only in simulation.
     feature : bool
-        Of the catalogue.
+        From the catalogue.
     """
 
     name: str
@@ -41,12 +41,12 @@ class Shown:
 
     @property
     def label(self) -> str:
-        """Name, with the words where they say more."""
+        """Name, with the description if there is one."""
         return f"{self.name} ({self.words})" if self.words else self.name
 
 
 def _feature_rows(solution: Recording) -> Iterator[tuple[str, str, Shown]]:
-    """Row of the catalogue, name of a value, what is shown of it."""
+    """Row of the catalogue, name of a value, and its description."""
     units = solution.units
     for row in catalogue("complete"):
         try:
@@ -58,28 +58,28 @@ def _feature_rows(solution: Recording) -> Iterator[tuple[str, str, Shown]]:
                 n_samples=solution.signal.shape[-1],
                 only=[row["name"]],
             )
-        except ValueError:  # this recording cannot have it
+        except ValueError:  # not available for this recording
             continue
         for name in names:
             unit = _unit(row["unit"], units.get(name.partition(".")[0], ""))
             yield row["name"], name, Shown(name=name, words="", unit=unit, seen=True, feature=True)
 
 
-def _unit(told: str, channel: str) -> str:
-    """Unit of a row of the catalogue, on a channel.
+def _unit(unit: str, channel: str) -> str:
+    """Unit of a row of the catalogue for a channel.
 
     Examples
     --------
     >>> _unit("x", "m/s^2"), _unit("dB re 1 x^2", "m/s^2"), _unit("-", "m")
     ('m/s^2', 'dB', '')
     """
-    if told.startswith("dB"):
+    if unit.startswith("dB"):
         return "dB"
-    return {"x": channel, "-": ""}.get(told, told)
+    return {"x": channel, "-": ""}.get(unit, unit)
 
 
 def truths_shown(truths: Mapping[str, Truth]) -> dict[str, Shown]:
-    """The same of what is known of a run.
+    """Descriptions of the quantities known of a run.
 
     Parameters
     ----------
@@ -94,24 +94,24 @@ def truths_shown(truths: Mapping[str, Truth]) -> dict[str, Shown]:
 def choose(
     patterns: Sequence[str], solution: Recording, truths: Mapping[str, Truth]
 ) -> tuple[Shown, ...]:
-    """Quantities that match any of some patterns, in the order of these.
+    """Quantities that match any of the patterns, in their order.
 
     Parameters
     ----------
     patterns : sequence of str
-        Names with ``*``, ``?`` and ``[…]`` as in a shell. A dot is as good as an underscore, the
-        channel and the ending ``.level_db`` may be left out, zeros before a number too; the name of
-        a row of the catalogue stands for all its values. Empty: levels of the channels, and the
-        quantities of interest of the machine.
+        Names with ``*``, ``?`` and ``[…]`` as in a shell. Dots and underscores are equivalent; the
+        channel, the ending ``.level_db`` and leading zeros may be omitted; the name of a row of the
+        catalogue stands for all its values. Empty: levels of the channels, and the quantities of
+        interest of the machine.
     solution : Recording
-        Of the scene that is swept.
+        Recording of the swept scene.
     truths : mapping of str to Truth
-        Of the same.
+        Truths of the same run.
 
     Raises
     ------
     SweepError
-        A pattern matches nothing, with what is near; or all match too much.
+        A pattern matches nothing (similar names are suggested), or there are too many matches.
     """
     rows = list(_feature_rows(solution))
     known = truths_shown(truths)
@@ -130,20 +130,18 @@ def choose(
         if not hits:
             faults.append(f"quantity '{pattern}' is unknown{_near(pattern, forms)}")
     if len(found) > MOST_SHOWN:
-        faults.append(
-            f"{len(found)} quantities are to be shown, must be <= {MOST_SHOWN}; name fewer"
-        )
+        faults.append(f"{len(found)} quantities are selected, must be <= {MOST_SHOWN}; name fewer")
     if faults:
         raise SweepError(faults)
     return tuple(found.values())
 
 
 def _usual(known: Mapping[str, Shown]) -> list[str]:
-    """Bands, orders, and what is not the wear itself or a guard of the run."""
+    """Bands, orders, and other quantities except the wear itself and guards of the run."""
     return [name for name, each in known.items() if each.seen or not re.search(_COLUMN, name)]
 
 
-_COLUMN = r"_(m|n|hz|pa|share|ratio|samples|margin)$"  # of a manifest
+_COLUMN = r"_(m|n|hz|pa|share|ratio|samples|margin)$"  # endings of manifest columns
 
 
 def _forms(name: str) -> Iterator[str]:
@@ -156,7 +154,7 @@ def _forms(name: str) -> Iterator[str]:
 
 
 def _plain(name: str) -> str:
-    """One way to write a name.
+    """Normalised spelling of a name.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Sweep of numbers of a scene: recordings on a grid, from several starts, and what stands out."""
+"""Sweep of numbers of a scene: recordings on a grid, from several starts, and their analysis."""
 
 import hashlib
 import json
@@ -39,32 +39,32 @@ from .detect import Detection, detect
 from .show import Shown, choose
 
 MOST_RUNS = 100_000
-"""Of a sweep."""
+"""Largest number of runs of a sweep."""
 
 _GOLDEN = 0.6180339887498949  # fractions of a turn: evenly spread for any number of starts
-_PAUSE = 2.0  # s between two writings of the runs that are kept
+_PAUSE = 2.0  # s between two writes of the kept runs
 _SEEDS = 65_537  # numbers of starts between two seeds
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is to be simulated, checked.
+    """Validated plan of the simulations.
 
     Attributes
     ----------
     name : str
-        Of the scene.
+        Name of the scene.
     axes : tuple of Axis
     scenes : mapping of Point to Scene
-        Of every point of the grid, with their rungs resolved.
+        Scene of every point of the grid, with resolved rungs.
     shown : tuple of Shown
     starts : int
-        Recordings at each point: other start angle, other sensor noise and random forces.
+        Recordings at each point, with different start angles, sensor noise and random forces.
     seed : int
     confidence : float
-        As of :func:`.sweep.detect.detect`.
+        As in :func:`.sweep.detect.detect`.
     truth : tuple of str or None
-        Names of the truth that suffices for what is shown; None: any of it.
+        Names of the truths needed for the quantities shown; None: all.
     """
 
     name: str
@@ -78,7 +78,7 @@ class Plan:
 
     @property
     def runs(self) -> list[tuple[Point, int]]:
-        """Point and start of each: all points once, then again."""
+        """Point and start of each run: all points with the first start, then with the next."""
         return [(point, start) for start in range(self.starts) for point in self.scenes]
 
     def number(self, start: int) -> int:
@@ -91,12 +91,12 @@ class Plan:
 
 
 class Row(NamedTuple):
-    """One quantity along the last axis, at one value of those before."""
+    """One quantity along the last axis, at one setting of the others."""
 
     setting: Point
     shown: Shown
     means: tuple[float, ...]
-    """At each value of the last axis; NaN where nothing is known."""
+    """Mean at each value of the last axis; NaN without values."""
     scatters: tuple[float, ...]
     """Standard deviations between starts."""
     counts: tuple[int, ...]
@@ -105,13 +105,13 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A plan with what was measured of it.
+    """A plan with its results.
 
     Attributes
     ----------
     plan : Plan
     outcomes : mapping
-        (point, start) -> outcome, of the runs that are done.
+        (point, start) -> outcome, for the finished runs.
     """
 
     plan: Plan
@@ -119,12 +119,12 @@ class Sweep:
 
     @property
     def finished(self) -> bool:
-        """All runs are done."""
+        """Whether all runs are done."""
         return len(self.outcomes) == len(self.plan.runs)
 
     @property
     def faults(self) -> dict[str, int]:
-        """Why runs have no values -> how many."""
+        """Reason for missing values -> number of runs."""
         found: dict[str, int] = {}
         for each in self.outcomes.values():
             if each.fault:
@@ -132,7 +132,7 @@ class Sweep:
         return found
 
     def samples(self, point: Point, name: str) -> NDArray[np.float64]:
-        """Values of a quantity at a point, start by start."""
+        """Values of a quantity at a point, for each start."""
         found = [self.outcomes.get((point, start)) for start in range(self.plan.starts)]
         values = [each.quantities[name][0] for each in found if each and name in each.quantities]
         return np.array([value for value in values if math.isfinite(value)], dtype=np.float64)
@@ -170,20 +170,20 @@ def sweep_plan(
     seed: int = 0,
     confidence: float = 0.95,
 ) -> Plan:
-    """Check what is asked for; a short run tells which quantities there are.
+    """Validate the request; a short run determines the available quantities.
 
     Parameters
     ----------
     subject : str
         Built-in scene, or file.
     over : sequence of str
-        Axes, as of :func:`.sweep.axes.parse_axis`.
+        Axes, as in :func:`.sweep.axes.parse_axis`.
     given : mapping of str to object, optional
         Values that replace those of the scene at every point.
     show : sequence of str
-        Patterns, as of :func:`.sweep.show.choose`.
+        Patterns, as in :func:`.sweep.show.choose`.
     points, starts, seed, confidence
-        As of the axes and of :class:`Plan`.
+        As in :func:`.sweep.axes.parse_axis` and :class:`Plan`.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def sweep_plan(
         faults += error.faults
     if len(scenes) * starts > MOST_RUNS:
         faults.append(
-            f"{len(scenes)} points x {starts} starts must be <= {MOST_RUNS}; ask for less"
+            f"{len(scenes)} points x {starts} starts must be <= {MOST_RUNS}; reduce one of them"
         )
     if faults:
         raise SweepError(faults)
@@ -210,12 +210,12 @@ def sweep_plan(
         starts=starts,
         seed=seed,
         confidence=confidence,
-        truth=_enough(probe, next(iter(scenes.values())), shown),
+        truth=_needed_truth(probe, next(iter(scenes.values())), shown),
     )
 
 
-def _enough(probe: Recording, scene: Scene, shown: Sequence[Shown]) -> tuple[str, ...] | None:
-    """The truth that the quantities of interest read, where all that is shown follows from it."""
+def _needed_truth(probe: Recording, scene: Scene, shown: Sequence[Shown]) -> tuple[str, ...] | None:
+    """Truths of the quantities of interest, if all quantities shown follow from these."""
     names = known_of(scene).truth
     if names is None:
         return None
@@ -227,7 +227,7 @@ def _enough(probe: Recording, scene: Scene, shown: Sequence[Shown]) -> tuple[str
 def _axes_of(
     subject: str, given: Mapping[str, Any], over: Sequence[str], points: int
 ) -> tuple[tuple[Axis, ...], dict[Point, Scene], list[str]]:
-    """Axes and scenes; the scene alone where the axes are at fault, so that all is told at once."""
+    """Axes, scenes and faults; only the scene if the axes are invalid, to report all at once."""
     from ...sim.scene.load import load_scene
 
     try:
@@ -238,7 +238,7 @@ def _axes_of(
 
 
 def _resolved(scenes: Mapping[Point, Scene]) -> dict[Point, Scene]:
-    """The same rungs at every point, chosen at the first: a sweep compares its points."""
+    """Use the rungs chosen at the first point for all, so that points are comparable."""
     _, resolution = resolved(next(iter(scenes.values())))
     if resolution is None:
         return dict(scenes)
@@ -246,7 +246,7 @@ def _resolved(scenes: Mapping[Point, Scene]) -> dict[Point, Scene]:
 
 
 def _probed(scenes: Mapping[Point, Scene]) -> tuple[Recording, dict[str, Truth]]:
-    """A run of few revolutions at the first point that admits one, as long as the others' say."""
+    """A short run at the first point that allows one, padded to the length of the others."""
     fault: Exception | None = None
     for scene in scenes.values():
         speed = scene.drive.speed  # type: ignore[attr-defined]
@@ -273,15 +273,15 @@ def values_of(solution: Recording, scene: Scene, names: Sequence[str]) -> dict[s
     Parameters
     ----------
     solution : Recording
-        With its truth.
+        Recording with its truth.
     scene : Scene
     names : sequence of str
-        Of features with a leading ``+``, of truths without.
+        Names of features with a leading ``+``, of truths without.
 
     Raises
     ------
     QuantityError
-        The recording cannot have a feature.
+        A feature cannot be computed for the recording.
     """
     features = [name[1:] for name in names if name.startswith("+")]
     truths = truths_of(solution, scene)
@@ -300,19 +300,19 @@ def _features(solution: Recording, names: Sequence[str]) -> dict[str, float]:
 
 
 def kept_runs(path: Path | None, plan: Plan) -> Kept[Outcome]:
-    """Runs of a plan in a file beside the output.
+    """Runs of a plan, kept in a file next to the output.
 
     Parameters
     ----------
     path : Path or None
-        None keeps nothing.
+        None: nothing is kept.
     plan : Plan
         Its number of starts and its confidence may change.
 
     Raises
     ------
     DataError
-        The file is damaged, or of another scene, version, axes or quantities.
+        The file is damaged, or belongs to another scene, version, axes or quantities.
     """
     return Kept(
         path,
@@ -343,15 +343,15 @@ def measure(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Make what is missing of a plan's runs.
+    """Run the missing runs of a plan.
 
     Parameters
     ----------
     plan : Plan
     kept : Kept
-        As of :func:`kept_runs`; each run is added when it is done.
+        From :func:`kept_runs`; each run is added when it is done.
     jobs : int
-        Worker processes; no value depends on it.
+        Worker processes; the values do not depend on it.
     progress : callable, optional
         Called with (runs done, runs in all).
     """
@@ -381,11 +381,11 @@ def _name(point: Point, start: int) -> str:
     return f"{','.join(map(str, point))} {start}"
 
 
-_Run = tuple[tuple[Point, int], Task]  # point and start, and what is to do
+_Run = tuple[tuple[Point, int], Task]  # point and start, and the task
 
 
 def _groups(plan: Plan, runs: Sequence[tuple[Point, int]]) -> list[tuple[_Run, ...]]:
-    """Runs that a worker makes together."""
+    """Groups of runs that a worker computes together."""
     kinds: dict[Point, Hashable | None] = {}
 
     def kind(run: _Run) -> Hashable | None:
@@ -413,6 +413,6 @@ def _tasks(plan: Plan, runs: Sequence[tuple[Point, int]]) -> Iterator[Task]:
 
 
 def sweep_of(plan: Plan, kept: Mapping[str, Outcome]) -> Sweep:
-    """A plan with what there is of its runs."""
+    """A plan with its finished runs."""
     done = {run: kept[_name(*run)] for run in plan.runs if _name(*run) in kept}
     return Sweep(plan=plan, outcomes=done)

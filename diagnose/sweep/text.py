@@ -10,12 +10,12 @@ from ..pages.si_text import plain, si_text
 from .axes import Point
 from .sweep import Row, Sweep
 
-_AT_ONCE = 1e-3  # of the axis: below it a change is told at once
-_NAMED = 3  # settings that the conclusion names
+_AT_ONCE = 1e-3  # of the axis: smaller detectable changes are reported as "any change"
+_NAMED = 3  # most settings named in the conclusion
 
 
 def setting_words(sweep: Sweep, setting: Point, *, short: bool = False) -> str:
-    """Values of the axes before the last: ``speed 320 rpm``.
+    """Values of all axes except the last: ``speed 320 rpm``.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def setting_words(sweep: Sweep, setting: Point, *, short: bool = False) -> str:
 
 
 def change_words(sweep: Sweep, row: Row) -> str:
-    """Smallest change that is told, in the unit of its axis."""
+    """Smallest detectable change, in the unit of its axis."""
     axis, change = sweep.plan.axes[-1], row.detection.change
     span = abs(axis.values[-1] - axis.values[0])
     if math.isnan(change):
@@ -45,9 +45,9 @@ def change_words(sweep: Sweep, row: Row) -> str:
 
 
 def best_rows(sweep: Sweep) -> list[Row]:
-    """Of every setting the row that tells the smallest change, by what the sensors see.
+    """Most sensitive row of every setting, among the quantities of the sensors.
 
-    Where no quantity of the sensors is shown, of what the simulator knows.
+    If none of these is shown, among those of the simulator.
     """
     rows = sweep.rows()
     judged = [row for row in rows if row.shown.seen] or rows
@@ -60,7 +60,7 @@ def best_rows(sweep: Sweep) -> list[Row]:
 
 
 def conclusion(sweep: Sweep) -> tuple[str, ...]:
-    """At which setting the change of the last axis shows first, in one to three sentences."""
+    """Setting at which the change of the last axis is detected first, in one to three sentences."""
     axis, best = sweep.plan.axes[-1], best_rows(sweep)
     what = f"{axis.words[:1].upper()}{axis.words[1:]}"
     begin = axis.text(axis.numbers[0], 4)
@@ -69,12 +69,13 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
         return (
             f"{what}: the smallest detectable change is unknown, because the scatter is; {cure}.",
         )
-    told = sorted((r for r in best if r.detection.told), key=lambda row: row.detection.change)
-    lost = [row for row in best if not row.detection.told]
-    if not told:
+    hits = [row for row in best if row.detection.detected]
+    hits.sort(key=lambda row: row.detection.change)
+    lost = [row for row in best if not row.detection.detected]
+    if not hits:
         far = axis.text(axis.numbers[-1], 4)
         return (f"{what}: no quantity reveals a change from {begin} up to {far}.",)
-    first, rest = told[0], told[1:]
+    first, rest = hits[0], hits[1:]
     where = f" at {setting_words(sweep, first.setting)}" if first.setting else ""
     verb = "shows first" if first.setting else "shows"
     lines = [
@@ -103,7 +104,7 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
 
 
 def _coarse(sweep: Sweep, row: Row) -> str:
-    """Warning that the first step of the axis is much wider than the change in it."""
+    """Warning that the first step of the axis is much wider than the detected change."""
     axis = sweep.plan.axes[-1]
     step = abs(axis.values[1] - axis.values[0])
     if not _AT_ONCE * step < row.detection.change < _WITHIN * step:
@@ -116,7 +117,7 @@ _WITHIN = 0.25  # of the first step
 
 
 def basis(sweep: Sweep) -> str:
-    """What was simulated, and what the figures mean."""
+    """Description of the simulations, and of the meaning of the numbers."""
     plan = sweep.plan
     scene = next(iter(plan.scenes.values()))
     swept = {axis.path for axis in plan.axes}
@@ -138,7 +139,7 @@ def basis(sweep: Sweep) -> str:
 
 
 def fault_lines(sweep: Sweep) -> list[str]:
-    """Runs without values, and why."""
+    """Numbers of runs without values, and reasons."""
     total = len(sweep.outcomes)
     return [f"{count} of {total} runs have no values: {why}" for why, count in sweep.faults.items()]
 
@@ -194,7 +195,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def sweep_table(sweep: Sweep) -> dict[str, Any]:
-    """A sweep as plain values, SI.
+    """A sweep as plain values in SI.
 
     Parameters
     ----------
@@ -204,8 +205,8 @@ def sweep_table(sweep: Sweep) -> dict[str, Any]:
     -------
     dict
         ``conclusion``, ``axes``, ``quantities``, ``rows`` (mean, scatter and number of starts along
-        the last axis; ``smallest_change`` is None where it is not known, or beyond the axis, which
-        ``told`` and ``judged`` say), ``runs`` and ``faults``.
+        the last axis; ``smallest_change`` is None if unknown (``judged`` false) or beyond the axis
+        (``told`` false)), ``runs`` and ``faults``.
     """
     plan = sweep.plan
     return {
@@ -235,9 +236,9 @@ def _row_table(sweep: Sweep, row: Row) -> dict[str, Any]:
         "mean": list(row.means),
         "scatter": list(row.scatters),
         "count": list(row.counts),
-        "told": found.told,
+        "told": found.detected,
         "judged": not math.isnan(found.change),
-        "smallest_change": found.change if found.told else None,
+        "smallest_change": found.change if found.detected else None,
         "threshold": found.threshold,
         "pooled_scatter": found.scatter,
         "degrees_of_freedom": found.freedom,
@@ -247,7 +248,7 @@ def _row_table(sweep: Sweep, row: Row) -> dict[str, Any]:
 
 
 def save_csv(sweep: Sweep, path: Path, *, force: bool = True) -> None:
-    """Write a tidy table: one row for each point and start, SI.
+    """Write a tidy table in SI: one row for each point and start.
 
     Columns: paths of the axes, ``start``, ``seed``, ``start_angle_rad``, ``fault``, quantities.
     """
