@@ -57,6 +57,7 @@ SPOKEN_BY = {
     "charts/scene_edit": {"chart", "simulate"},
     "class_model/train": {"import"},
     "wear_model/like": {"import", "info", "report"},
+    "machines/pump": {"report"},
     "nameplate/cautions": {"report"},
     "source/settled": {"import", "info", "report"},
     "feature_rows/feature_table": {"evaluate", "features", "report", "train"},

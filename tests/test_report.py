@@ -28,6 +28,7 @@ from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
 from wearstate.diagnose.report.figures import moved_panel, report_pictures
 from wearstate.diagnose.report.page import batch_html, report_html
 from wearstate.diagnose.report.points import trend_points
+from wearstate.diagnose.report.second_estimate import ModelOpinion
 from wearstate.diagnose.report.text import batch_text, report_text
 from wearstate.diagnose.report.verdict import (
     evidence_words,
@@ -250,6 +251,43 @@ def test_a_twin_stands_beside_the_model_and_a_disagreement_before_the_verdict(mo
     silent = report_table(found, model, graded(), twin=TwinOpinion(reason="tacho must be there"))
     assert silent["twin"]["agrees"] is None
     assert "Twin        no estimate: tacho must be there" in report_text(silent)
+
+
+def test_another_model_stands_next_to_this_one_and_is_first_outside_its_interval(model):
+    """Wide as its own interval may be: where its estimate lies decides."""
+    found = recording_of(2.5e-4)
+    inside = ModelOpinion(trained_on="oval eyes", severity=2.6e-4, low=1.8e-4, high=3.6e-4)
+    agreed = report_table(found, model, graded(), other=inside)
+    assert (agreed["other_model"]["agrees"], agreed["disagreements"]) == (True, [])
+    assert "Other       0.260 mm (0.180 to 0.360, 90 %), by the model of" in report_text(agreed)
+    assert "Another model: 0.260 mm" in shown(report_html(agreed, found, model))
+
+    outside = dataclasses.replace(inside, severity=3.4e-4)
+    apart = report_table(found, model, graded(), other=outside)
+    assert not apart["other_model"]["agrees"]
+    said = "Disagree    the model of oval eyes estimates 0.340 mm (0.180 to 0.360, 90 %), outside"
+    assert report_text(apart).splitlines()[1].startswith(said[:70])
+    assert "with caution" in apart["headline"]
+
+    silent = ModelOpinion(trained_on="oval eyes", reasons=("it is unfamiliar",))
+    table = report_table(found, model, graded(), other=silent)
+    assert (table["other_model"]["agrees"], table["disagreements"]) == (None, [])
+    assert "Other       it is unfamiliar, by the model of oval eyes" in report_text(table)
+
+
+def test_another_model_is_named_to_the_command(model_file, tmp_path):
+    one, two = written(tmp_path / "one.h5", [2.5e-4]), written(tmp_path / "two.h5", [1e-4, 2e-4])
+    also = ("--model", model_file, "--also", model_file)
+    told = json.loads(run("report", one, *also, "--json").output)
+    own = told["estimate"]
+    assert told["other_model"]["severity"] == own["severity"]
+    assert told["other_model"]["agrees"]
+    many = run("report", two, *also, code=2).output
+    assert "--also is for one recording: name one, or choose a --record" in many
+    other = load_model(model_file)
+    other = dataclasses.replace(other, card=other.card.model_copy(update={"severity": "sag_m"}))
+    with pytest.raises(DataError, match="also: its wear = sag_m must be diametral_clearance"):
+        wearstate.report(one, model_file, also=other)
 
 
 def test_a_twin_is_asked_by_the_command(model_file, tmp_path):
@@ -482,7 +520,7 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     assert "largest deviation from the machine&#39;s healthy recordings" in shown(page.read_text())
     stranger = written(tmp_path / "other.h5", [2.5e-4], groups=[60], seed=3)
     said = run("report", stranger, *args[2:], "--baseline", healthy, code=2).stderr
-    assert 'must have some of machine 60 of recipe "knocking", seed 0, which other.h5[0]' in said
+    assert 'of machine 60 of recipe "knocking", seed 0, the machine of other.h5[0]' in said
     said = run(*args, "--baseline", page, code=2).stderr
     assert "must be a data set (.h5); make one of the healthy recordings" in said
     said = run(*args, "--baseline", worn, code=2).stderr

@@ -61,6 +61,12 @@ _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: o
     help="Calibrated scene of this machine (wearstate calibrate): gives a second estimate.",
 )
 @click.option(
+    "--also",
+    type=PATH,
+    metavar="MODEL",
+    help="Second wear model, of other assumptions (bilge-pump-oval): shown next to this one.",
+)
+@click.option(
     "--trend", is_flag=True, help="For many recordings: wear over time and remaining life."
 )
 @click.option(
@@ -110,7 +116,8 @@ def report(
     from ..wear_model.file import load_model
 
     views = views_of(given["joined"])
-    inputs = [source, model_file, *(view.path for view in views), *([healthy] if healthy else [])]
+    optional = [path for path in (healthy, given["also"]) if path]
+    inputs = [source, model_file, *(view.path for view in views), *optional]
     check_outputs(inputs, [(output, PAGE_SUFFIXES)], force)
     known_machine(machine)
     if kind_of(model_file) == CLASS_MODEL:
@@ -124,6 +131,7 @@ def report(
             "--fail-on": fail_on,
             "--join": given["joined"],
             "--twin": given["twin"],
+            "--also": given["also"],
             "--trend": given["trend"],
             "--dates": given["dates"],
         }
@@ -142,6 +150,8 @@ def report(
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
     if many and given["twin"]:
         raise click.UsageError("--twin is for one recording: name one, or choose a --record")
+    if many and given["also"]:
+        raise click.UsageError("--also is for one recording: name one, or choose a --record")
     if given["interactive"]:
         _check_interactive(output, many and not (given["trend"] or given["dates"]))
     if views and source.is_dir():
@@ -254,6 +264,7 @@ def _report_one(task: _ReportTask) -> list[_Verdict]:
         plate=task.plate,
         machine=task.machine,
         twin=_opinion(task, heard),
+        also=task.given["also"],
         files={"recording": task.source, "model": task.model_file},
     )
     table, text = found.table, found.text

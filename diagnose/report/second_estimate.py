@@ -5,15 +5,40 @@ assumed to be.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ..film_clearance.clearance import FilmEstimate
 from ..twin.opinion import TwinOpinion
 from ..wear_model.verdict import Estimate
 
-SecondEstimate = FilmEstimate | TwinOpinion
-"""Both have `severity`, `low` and `high`, None without an estimate, and `coverage`."""
+
+@dataclass(frozen=True, kw_only=True)
+class ModelOpinion:
+    """Estimate of another wear model for the same recording.
+
+    Attributes
+    ----------
+    trained_on : str
+        Recipe or scene of its training records.
+    severity, low, high : float or None
+        Wear and its interval [m]; None without an estimate.
+    coverage : float
+        Nominal coverage of the interval.
+    reasons : tuple of str
+        Why there is no estimate.
+    """
+
+    trained_on: str
+    severity: float | None = None
+    low: float | None = None
+    high: float | None = None
+    coverage: float = 0.9
+    reasons: tuple[str, ...] = ()
+
+
+SecondEstimate = FilmEstimate | TwinOpinion | ModelOpinion
+"""All have `severity`, `low` and `high`, None without an estimate, and `coverage`."""
 
 
 def disagree(estimate: Estimate, second: SecondEstimate) -> bool:
@@ -98,6 +123,46 @@ def twin_words(twin: TwinOpinion) -> str:
         f"{length_words(twin)}, by {twin.members} simulated machines like {twin.scene}, without "
         "training"
     )
+
+
+def with_other_model(estimate: Estimate, other: ModelOpinion | None) -> Estimate:
+    """Put an estimate by another model first if it is outside the interval of this one.
+
+    Intervals may overlap: a model of wider assumptions has wider intervals, and its estimate says
+    what the wear is if these hold.
+
+    Examples
+    --------
+    >>> trained = Estimate(verdict="graded", grade=1, severity=1.9e-4, low=1.7e-4, high=2.2e-4)
+    >>> other = ModelOpinion(trained_on="bilge-pump-oval", severity=2.9e-4, low=2e-4, high=4e-4)
+    >>> with_other_model(trained, other).cautions[0][:61]
+    'the model of bilge-pump-oval estimates 0.290 mm (0.200 to 0.4'
+    """
+    if other is None or _holds(estimate, other):
+        return estimate
+    said = (
+        f"the model of {other.trained_on} estimates {length_words(other)}, outside the interval of "
+        f"this one, {length_words(estimate)}: find out which assumptions hold, measure the wear, "
+        "and rely on the larger one until then"
+    )
+    return replace(estimate, verdict="caution", cautions=(said, *estimate.cautions))
+
+
+def _holds(estimate: Estimate, other: ModelOpinion) -> bool:
+    """Whether the interval of an estimate contains the other one, or there is none of the two."""
+    if estimate.low is None or estimate.high is None or other.severity is None:
+        return True
+    return estimate.low <= other.severity <= estimate.high
+
+
+def other_model_table(other: ModelOpinion | None, estimate: Estimate) -> dict[str, Any] | None:
+    """Estimate by another model, for JSON and pages; None without one."""
+    if other is None:
+        return None
+    words = "; ".join(other.reasons) if other.severity is None else length_words(other)
+    agrees = None if None in (other.severity, estimate.severity) else _holds(estimate, other)
+    text = f"{words}, by the model of {other.trained_on}"
+    return {**asdict(other), "agrees": agrees, "text": text}
 
 
 def new_cautions(before: Estimate, after: Estimate) -> list[str]:

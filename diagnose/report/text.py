@@ -44,6 +44,8 @@ def report_text(table: Mapping[str, Any]) -> str:
         lines.append(("Film", f"equilibrium: {table['film']['text']}"))
     if table["twin"] is not None:
         lines.append(("Twin", table["twin"]["text"]))
+    if table["other_model"] is not None:
+        lines.append(("Other", table["other_model"]["text"]))
     lines.append(("Advice", advice["sentence"]))
     if advice["horizon"]:
         lines.append(("How soon", f"{advice['horizon']} ({advice['basis']})"))

@@ -27,7 +27,14 @@ from ..wear_model.estimate import WearModel, input_faults
 from ..wear_model.verdict import Estimate, unseen_words
 from .advice import advise, touched_grades
 from .film import film_estimate, film_table, with_film
-from .second_estimate import new_cautions, twin_table, with_twin
+from .second_estimate import (
+    ModelOpinion,
+    new_cautions,
+    other_model_table,
+    twin_table,
+    with_other_model,
+    with_twin,
+)
 from .trend import Outlook
 
 REPORT_SCHEMA = 2
@@ -63,6 +70,7 @@ def report_table(
     baseline: Baseline | None = None,
     plate: Nameplate | None = None,
     twin: TwinOpinion | None = None,
+    other: ModelOpinion | None = None,
     outlook: Outlook | None = None,
     files: Mapping[str, Path] | None = None,
 ) -> dict[str, Any]:
@@ -82,6 +90,8 @@ def report_table(
         Nameplate of the machine, for the estimate by film equilibrium.
     twin : TwinOpinion, optional
         Estimate by the twin of the machine.
+    other : ModelOpinion, optional
+        Estimate by another wear model.
     outlook : Outlook, optional
         Outlook of the machine's trend; it may shorten the horizon.
     files : mapping, optional
@@ -92,9 +102,10 @@ def report_table(
     dict
         ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (estimate by the
         film equilibrium, None if there is none for this machine), ``twin`` (estimate by the twin,
-        or None), ``disagreements`` (of these with the model), ``grades_text``, ``advice``,
-        ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``, ``baseline_note``,
-        ``unseen`` (effects that mislead the model without a warning), ``notice``, ``provenance``.
+        or None), ``other_model`` (estimate by another model, or None), ``disagreements`` (of these
+        with the model), ``grades_text``, ``advice``, ``limits``, ``iso``, ``outlook``,
+        ``evidence_summary``, ``evidence``, ``baseline_note``, ``unseen`` (effects that mislead the
+        model without a warning), ``notice``, ``provenance``.
         Lengths in metres, speeds in revolutions per second.
 
     Raises
@@ -106,7 +117,8 @@ def report_table(
     quantity = quantity_name(card.severity)
     corrections = correction_words(recording, plate, baseline)
     film = film_estimate(recording, card.severity, plate, baseline)
-    trained, estimate = estimate, with_twin(with_film(estimate, film), twin)
+    trained, estimate = estimate, with_other_model(estimate, other)
+    estimate = with_twin(with_film(estimate, film), twin)
     return {
         "schema_version": REPORT_SCHEMA,
         "headline": headline(estimate),
@@ -114,6 +126,7 @@ def report_table(
         "estimate": estimate.as_dict(),
         "film": film_table(film, plate, recording.row),
         "twin": twin_table(twin, trained),
+        "other_model": other_model_table(other, trained),
         "disagreements": new_cautions(trained, estimate),
         "grades_text": possible_words(estimate, card.grade_edges_m),
         "advice": asdict(advise(estimate, quantity, card.grade_edges_m, outlook)),

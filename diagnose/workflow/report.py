@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...datasets.file.writer import refuse_output
 from ...datasets.measured.recording import read_recording
-from ...sim.output.recording import Recording, Table
+from ...sim.output.recording import DataError, Recording, Table
 from ..healthy_reference.healthy import Baseline, Baselines
 from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate, nameplate_of
@@ -19,6 +19,7 @@ from ..nameplate.sensors import corrected_recording
 from ..pages.page import save_page
 from ..report.figures import draw_gauge
 from ..report.page import report_html
+from ..report.second_estimate import ModelOpinion
 from ..report.text import report_text
 from ..report.verdict import known_machine, report_table
 from ..twin.opinion import TwinOpinion, second_opinion
@@ -162,6 +163,7 @@ def report(
     values: Mapping[str, Any] | None = None,
     machine: str | None = None,
     twin: str | Path | None = None,
+    also: WearModel | str | Path | None = None,
     seed: int = 0,
 ) -> Report:
     """Judge one recording: wear with an interval, grade and advice, or why there is none.
@@ -187,6 +189,8 @@ def report(
     twin : str or Path, optional
         Calibrated scene of this machine, from :func:`wearstate.calibrate`, which gives a second
         wear estimate by simulation.
+    also : WearModel, str or Path, optional
+        A second wear model, trained on other assumptions, whose estimate is shown next to this one.
     seed : int
         Seed of the twin's draws, >= 0.
 
@@ -233,6 +237,7 @@ def report(
         twin=None
         if twin is None
         else second_opinion(twin, read, wear=known.card.severity, seed=seed),
+        also=also,
         files={"recording": source} if source else None,
     )
 
@@ -245,6 +250,7 @@ def judged(
     plate: Nameplate | None,
     machine: str | None,
     twin: TwinOpinion | None = None,
+    also: WearModel | str | Path | None = None,
     files: Mapping[str, Path] | None,
 ) -> Report:
     """Report on a recording with known machine data, all of it already read."""
@@ -262,6 +268,7 @@ def judged(
         baseline=baseline,
         plate=plate,
         twin=twin,
+        other=None if also is None else _other_opinion(recording, model, also, plate),
         files=files,
     )
     return Report(
@@ -274,6 +281,30 @@ def judged(
     )
 
 
+def _other_opinion(
+    recording: Recording, model: WearModel, also: WearModel | str | Path, plate: Nameplate | None
+) -> ModelOpinion:
+    """Estimate of another model for a recording."""
+    other = also if isinstance(also, WearModel) else load_model(also)
+    wanted, found = model.card.severity, other.card.severity
+    if found != wanted:
+        raise DataError(f"also: its wear = {found} must be {wanted}, as of the model; name another")
+    estimate = other.estimate(
+        corrected_recording(recording, plate),
+        None,
+        **recording_context(plate, recording, other.card, None),
+    )
+    trained = other.card.trained_on
+    return ModelOpinion(
+        trained_on=trained.recipe or trained.scene or "another training set",
+        severity=estimate.severity,
+        low=estimate.low,
+        high=estimate.high,
+        coverage=estimate.coverage,
+        reasons=estimate.reasons,
+    )
+
+
 def _also_contradicted(estimate: Estimate, said: Mapping[str, Any]) -> Estimate:
-    """The estimate with the contradictions of film equilibrium and twin before its cautions."""
+    """The estimate with the contradictions of the second estimates before its cautions."""
     return replace(estimate, verdict=said["verdict"], cautions=tuple(said["cautions"]))
