@@ -110,8 +110,8 @@ def test_a_pump_at_rest_stands_at_suction_pressure():
     ("overrides", "words"),
     [
         ({"pressure.sensor.noise": 5.0}, r"pressure\.sensor\.range is missing"),
-        ({**SENSOR, "pressure.sensor.line_resonance": "100 Hz"}, "needs line_damping beside it"),
-        ({**SENSOR, "pressure.sensor.line_damping": 0.3}, "needs line_resonance beside it"),
+        ({**SENSOR, "pressure.sensor.line_resonance": "100 Hz"}, "needs line_damping as well"),
+        ({**SENSOR, "pressure.sensor.line_damping": 0.3}, "needs line_resonance as well"),
         ({**SENSOR, "pressure.sensor.name": "acc_x"}, "name 'acc_x' is given 2 times"),
         ({**SENSOR, "pressure.sensor.lag": "2 s"}, r"sensor\.lag = 2 s must be <= "),
     ],
