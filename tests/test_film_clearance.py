@@ -144,7 +144,7 @@ def test_healthy_recordings_tell_a_scar_from_a_wider_bore():
     plain = film_clearance(run, round_bore, ANGLES, AS_NEW, healthy=healthy)
     told = film_clearance(run, round_bore, ANGLES, AS_NEW, **known)
     # a round bore does not explain it, and nothing is asked for that was given
-    assert "no clearance puts the journal" in plain.reason
+    assert "no clearance explains the journal" in plain.reason
     assert "--baseline" not in plain.reason
     # the scars that are tried lie so far apart; half the interval is a tenth
     across = 0.2e-3 * (1 + 0.28 / 2)
@@ -173,7 +173,7 @@ def test_a_whirl_and_a_contradiction_are_said():
         readings=turned.readings, swing=1e-6, load=(6e3, 0.0), film_force=turned.film_force
     )
     said = film_clearance(wrong, CURVE, ANGLES, AS_NEW).reason
-    assert "no clearance puts the journal" in said
+    assert "no clearance explains the journal" in said
     assert "give healthy recordings (--baseline)" in said
 
 
@@ -554,7 +554,7 @@ def test_what_no_clearance_explains_is_a_caution_too():
     run = replace(placed(0.2e-3, load=(0.0, 6e3)), load=(6e3, 0.0))
     said = with_film(trained, film_clearance(run, CURVE, ANGLES, AS_NEW))
     assert said.verdict == "caution"
-    assert said.cautions[0].startswith("film equilibrium: no clearance puts the journal where")
+    assert said.cautions[0].startswith("film equilibrium: no clearance explains")
     refused = Estimate(verdict="unfamiliar", severity=1.5e-4)
     assert with_film(refused, film_clearance(run, CURVE, ANGLES, AS_NEW)) is refused
     # one that runs too light to tell contradicts nothing

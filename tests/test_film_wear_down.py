@@ -65,7 +65,7 @@ def test_healthy_recordings_take_offsets_and_tolerances_away():
 
 def test_what_no_wear_explains_is_said():
     turned = sunk(0.5e-3, offset=(300e-6, -300e-6))
-    assert "no wear-down puts the journal" in told(turned).reason
+    assert "no wear-down explains the journal" in told(turned).reason
     assert "--baseline" in told(sunk(2 * LIMIT)).reason
 
 
@@ -117,7 +117,7 @@ def test_a_bore_worn_to_an_arc_is_told_against_healthy_recordings():
         ]
 
     for found in told_by(1):
-        assert "no wear-down puts the journal" in found.reason
+        assert "no wear-down explains the journal" in found.reason
     alone, found = told_by(len(likely))
     assert "bore of another shape" in alone.reason
     assert found.low < 0.7e-3 < found.high

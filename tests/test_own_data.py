@@ -140,7 +140,7 @@ def test_conditions_that_do_not_differ_are_not_told_apart(tmp_path):
     """Windows of one recording are alike, which must be of no help."""
     path = own_set(tmp_path, (("a", 700.0), ("b", 700.0)), seed=5)
     model, result = train_classes(path, target="condition", seed=0)
-    assert "the largest class alone would be 0.50: that may be chance" in model.notice
+    assert "the largest class alone would give 0.50: that may be chance" in model.notice
     assert result["accuracy"] < 0.85
     assert result["recordings_right"] <= 6  # 7 or 8 of 8 by chance: 9 in 256
 
@@ -344,7 +344,7 @@ def test_the_report_names_one_or_many_and_refuses_what_is_of_wear(trained, tmp_p
 def test_labels_that_cannot_be_learnt_are_refused(trained, tmp_path):
     with pytest.raises(DataError, match="target = 'kind' must be one of its columns"):
         train_classes(trained[0], target="kind")
-    with pytest.raises(DataError, match="is a column of fractions"):
+    with pytest.raises(DataError, match="is a column of decimal numbers"):
         train_classes(trained[0], target="start_s")
     alone = own_set(tmp_path, (("a", 700.0),))
     with pytest.raises(DataError, match=r"1 classes of >= 3 recordings \(4 of a\), must be >= 2"):

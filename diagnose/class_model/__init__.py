@@ -1,4 +1,4 @@
-"""Models that tell named conditions instead of metres of wear.
+"""Models that recognise named conditions instead of estimating wear in metres.
 
 It may import ``sim.output``, ``datasets.file``, ``datasets.split``, ``diagnose.learning``,
 ``diagnose.feature_rows``, ``diagnose.recording_faults``, ``diagnose.familiarity``,

@@ -1,4 +1,4 @@
-"""The file of a model of named conditions: what is in it, and whether its parts fit each other."""
+"""File of a model of named conditions: its content, and checks that its parts are consistent."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,7 +29,7 @@ from .train import ClassModel
 from .votes import Votes
 
 CLASS_MODEL = "class model"
-"""Word of such a file for its kind."""
+"""Kind of such a file."""
 
 _ROUNDING = 1e-9
 
@@ -44,7 +44,7 @@ def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False
     Parameters
     ----------
     model : ClassModel
-        What :func:`wearstate.train_classes` gives.
+        Model from :func:`wearstate.train_classes`.
     path : str or Path
         Usually ``*.wsm``.
     force : bool
@@ -55,7 +55,7 @@ def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False
     DataError
         The file exists, or its folder does not.
     ModelError
-        The model could not be read again.
+        The model could not be read back.
 
     Examples
     --------
@@ -77,18 +77,18 @@ def load_class_model(path: str | Path) -> ClassModel:
     Parameters
     ----------
     path : str or Path
-        File of :func:`save_class_model`.
+        File from :func:`save_class_model`.
 
     Returns
     -------
     ClassModel
-        As it was saved.
+        The saved model.
 
     Raises
     ------
     ModelError
-        No such file, another kind of model, damaged, changed, of another version of the format or
-        of the features, or forged so that its parts do not fit each other.
+        The file is missing, damaged or modified, of another kind or another version of format or
+        features, or its parts are inconsistent.
 
     Examples
     --------
@@ -131,12 +131,12 @@ def _model_of(
 
 
 def _check(model: ClassModel, path: str | Path) -> None:
-    """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
+    """Check that shapes are consistent, so that a forged file fails here, not in a prediction."""
     n = len(model.names)
     try:
         physical = physical_rows(model.names, np.zeros((1, n)))
     except ValueError as error:
-        raise ModelError(f"{path}: features do not fit each other ({error}); retrain it") from error
+        raise ModelError(f"{path}: features are inconsistent ({error}); retrain it") from error
     fits = {
         "blends": len(model.blends) == len(model.classes)
         and all(blend_fits(blend, n) for blend in model.blends),

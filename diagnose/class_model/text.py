@@ -8,12 +8,12 @@ from .train import Naming
 
 
 def classes_text(result: Mapping[str, Any]) -> list[str]:
-    """A judgement as lines for a terminal.
+    """An evaluation as lines for a terminal.
 
     Parameters
     ----------
     result : mapping
-        Of :func:`score_votes`.
+        From :func:`score_votes`.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def _between(result: Mapping[str, Any], name: str) -> str:
 
 
 def namings_summary(namings: Sequence[Naming]) -> str:
-    """How many recordings there are, and what was found in them.
+    """Number of recordings, and the conditions found in them.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ def namings_summary(namings: Sequence[Naming]) -> str:
     'no condition is named, 2 recordings: 2 unfamiliar'
     """
     words = Counter(naming.name or naming.verdict for naming in namings)
-    told = ", ".join(f"{count} {word}" for word, count in words.most_common())
+    counts = ", ".join(f"{count} {word}" for word, count in words.most_common())
     none = "" if any(naming.name for naming in namings) else "no condition is named, "
-    return f"{none}{len(namings)} recordings: {told}"
+    return f"{none}{len(namings)} recordings: {counts}"
 
 
 def naming_text(naming: Naming) -> str:
-    """What a model says of one recording, in lines.
+    """Result of a model for one recording, as lines.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Recordings of your own that carry names of conditions: a model that tells which.
+"""Model that recognises named conditions, trained on the user's labelled recordings.
 
-There is no clearance in metres here and no grade: a recording is of one of the labelled classes,
-with a set of those that cannot be excluded, or of none that is known.
+There is no clearance in metres and no grade: a recording belongs to one of the labelled classes,
+with a set of those that cannot be excluded, or to none.
 """
 
 import json
@@ -43,33 +43,33 @@ Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _MOST_CLASSES = 20
-_MOST_FOLDS = 10  # of whole recordings; each by itself up to so many
-_FEWEST_TO_KNOW = 10  # recordings of the training; with fewer, most strangers pass for known
-_USED = ("plain ridge", "trees")  # candidates that a handful of recordings can carry
+_MOST_FOLDS = 10  # of whole recordings; up to this number each is a fold
+_FEWEST_TO_KNOW = 10  # training recordings; with fewer, most unknown conditions are accepted
+_USED = ("plain ridge", "trees")  # candidates suitable for few recordings
 
 
 @dataclass(frozen=True, kw_only=True)
 class Naming:
-    """What a model of classes says of one recording.
+    """Result of a class model for one recording.
 
     Attributes
     ----------
     verdict : {"named", "unfamiliar", "unusable"}
-        Unfamiliar: like none of the trained recordings. Unusable: the recording is at fault.
+        Unfamiliar: like none of the training recordings. Unusable: the recording is faulty.
     reasons : tuple of str
-        Why there is no name; empty where there is one.
+        Why there is no name; empty if there is one.
     cautions : tuple of str
-        What makes a name doubtful: faults of the recording that bar none.
+        What makes a name doubtful: minor faults of the recording.
     name : str
         The likeliest class; empty without one.
     possible : tuple of str
-        Classes that cannot be excluded, in the order of the model; never empty where named.
+        Classes that cannot be excluded, in the order of the model; not empty if named.
     shares : dict
         Class -> share of the votes, sum 1.
     p_value : float or None
-        Of the hypothesis that the recording is of a trained class.
+        P-value of the hypothesis that the recording is of a trained class.
     p_limit : float or None
-        At or below it a recording is called unfamiliar.
+        Limit at or below which a recording is unfamiliar.
     """
 
     verdict: Literal["named", "unfamiliar", "unusable"]
@@ -82,7 +82,7 @@ class Naming:
     p_limit: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Result for JSON."""
         return asdict(self)
 
 
@@ -93,14 +93,14 @@ class ClassModel:
     Attributes
     ----------
     blends : tuple of Blend
-        One a class: features to 1 (another) … 2 (this one).
+        One per class: features -> 1 (another) … 2 (this one).
     votes : Votes
-        On the training records.
+        Votes on the training records.
     familiarity : tuple of Familiarity
-        The cloud of the training recordings of each class: between two classes lies neither. Of a
-        class of too few recordings, that of all.
+        Distribution of the training recordings of each class, because a recording between two
+        classes belongs to neither; for a class with too few recordings, that of all.
     card : ClassCard
-        What it was trained on, its inputs and classes.
+        Training data, inputs and classes.
     """
 
     blends: tuple[Blend, ...]
@@ -120,7 +120,7 @@ class ClassModel:
 
     @cached_property
     def scores(self) -> dict[str, Any]:
-        """Accuracy by recordings left out, as of :func:`score_votes`."""
+        """Accuracy on left-out recordings, from :func:`score_votes`."""
         return score_votes(self.votes, self.classes)
 
     def __repr__(self) -> str:
@@ -129,7 +129,7 @@ class ClassModel:
 
     @property
     def notice(self) -> str:
-        """What must be said beside every result."""
+        """Notice to be shown with every result."""
         few = [
             f"{name}: {count} recording(s), can be neither evaluated nor excluded"
             for name, count in zip(self.classes, self.votes.groups_of, strict=True)
@@ -145,30 +145,30 @@ class ClassModel:
         accuracy, guess = self.scores["accuracy"], self.scores["majority"]
         if self.scores["recordings_judged"] and self.scores["intervals"]["accuracy"][0] <= guess:
             few.append(
-                f"of recordings left out it named {accuracy:.2f} rightly, the largest class alone "
-                f"would be {guess:.2f}: that may be chance"
+                f"it named {accuracy:.2f} of left-out recordings correctly, the largest class "
+                f"alone would give {guess:.2f}: that may be chance"
             )
         return "; ".join(few)
 
     def distance(self, rows: Float) -> Float:
-        """From the nearest class [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        """Distance of feature rows [shape=(n, n_features)] from the nearest class [shape=(n,)]."""
         return _nearest_distance(self.familiarity, self.names, rows)
 
     def predict(self, rows: Float) -> Float:
-        """Shares [shape=(n, n_classes)] of feature rows [shape=(n, n_features)]."""
+        """Shares [shape=(n, n_classes)] for feature rows [shape=(n, n_features)]."""
         return _shares(np.stack([blend.predict(rows) for blend in self.blends], axis=1))
 
     def estimate(
         self, recording: Recording | NDArray[Any] | Table, *, fs: float | None = None
     ) -> Naming:
-        """Tell the condition in a recording.
+        """Recognise the condition in a recording.
 
         Parameters
         ----------
         recording : Recording, numpy.ndarray or pandas.DataFrame
-            Any; one that lacks the model's inputs or is at fault is unusable, with the reasons. An
-            array [shape=(n_channels, n_samples)] has the model's channels in their order and units,
-            a table a column for each.
+            One that lacks the model's inputs or is faulty is unusable, with the reasons. An array
+            [shape=(n_channels, n_samples)] has the model's channels in their order and units, a
+            table one column per channel.
         fs : float, optional
             Sample rate of an array or a table [Hz].
 
@@ -179,9 +179,9 @@ class ClassModel:
         Raises
         ------
         DataError
-            The signal cannot be turned into features.
+            The features cannot be computed.
         ModelError
-            The program's features are not the model's.
+            The features of this program are not those of the model.
         """
         recording = self.card.recording_of(recording, fs)
         faults = layout_faults(recording, self.card) or sample_faults(recording)
@@ -198,23 +198,23 @@ class ClassModel:
         return replace(self.judge(row, blow_scores(recording)), cautions=flawed)
 
     def judge(self, row: Float, blows: Float) -> Naming:
-        """Tell the condition from features and blows.
+        """Recognise the condition from features and impact scores.
 
         Parameters
         ----------
         row : numpy.ndarray [shape=(n_features,)]
         blows : numpy.ndarray [shape=(n_channels,)]
-            Of :func:`wearstate.diagnose.feature_rows.blows.blow_scores`.
+            From :func:`wearstate.diagnose.feature_rows.blows.blow_scores`.
 
         Returns
         -------
         Naming
         """
         shares = self.predict(row[None, :])[0]
-        told = {name: float(value) for name, value in zip(self.classes, shares, strict=True)}
+        votes = {name: float(value) for name, value in zip(self.classes, shares, strict=True)}
         distance = float(self.distance(row[None, :])[0])
         p_value, p_limit = self.votes.p_value(distance), self.votes.p_limit
-        judged: dict[str, Any] = {"shares": told, "p_value": p_value, "p_limit": p_limit}
+        judged: dict[str, Any] = {"shares": votes, "p_value": p_value, "p_limit": p_limit}
         if p_value <= p_limit:
             reason = (
                 f"unlike the recordings of every class (p = {p_value:.2g}, unfamiliar at "
@@ -233,7 +233,7 @@ class ClassModel:
         )
 
     def _no_blows(self, kept: Sequence[int], blows: Float) -> str:
-        """Why a recording is of none of these classes."""
+        """Why a recording belongs to none of these classes."""
         floors = self.votes.blow_floors[list(kept)]
         return (
             f"without the blows of every recording of {', '.join(self.classes[c] for c in kept)}: "
@@ -243,7 +243,7 @@ class ClassModel:
 
 
 def _shares(values: Float) -> Float:
-    """Votes of 1 (no) to 2 (yes) as shares of sum 1; all alike where nobody votes."""
+    """Votes from 1 (no) to 2 (yes) as shares with sum 1; equal without any votes."""
     votes = np.clip(values - 1, 0, 1)
     total = votes.sum(axis=1, keepdims=True)
     even = np.full_like(votes, 1 / votes.shape[1])
@@ -262,19 +262,19 @@ def train_classes(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> tuple[ClassModel, dict[str, Any]]:
-    """Fit a model of named conditions, and judge it with whole recordings left out.
+    """Fit a model of named conditions, and evaluate it with whole recordings left out.
 
     Parameters
     ----------
     path : str or Path
-        Data set with a label of texts; its groups (files, unless others were named) decide every
-        split, so that windows of one recording are never on both sides.
+        Data set with a text label. Splits are made by its groups (by default files), so that
+        windows of one recording are never on both sides.
     target : str
         Manifest column with the label.
     choice : Choice
         Features to train on.
     seed : int
-        Of folds, trees and resamples.
+        Seed of folds, trees and resamples.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -285,7 +285,7 @@ def train_classes(
     model : ClassModel
         Fitted on all recordings.
     result : dict
-        As :func:`score_votes`, every recording judged by a fit that it had no part in.
+        As from :func:`score_votes`, with every recording judged by a fit without it.
 
     Raises
     ------
@@ -315,7 +315,7 @@ def _labels_of(manifest: Any, target: str, path: str | Path) -> NDArray[np.str_]
     column = manifest[target].to_numpy()
     if column.dtype.kind == "f":
         raise DataError(
-            f"{path}: {target} is a column of fractions, must be one of names; train for a "
+            f"{path}: {target} is a column of decimal numbers, must be one of names; train for a "
             "severity, or label the recordings by names"
         )
     labels = np.asarray(column, dtype=str)
@@ -359,13 +359,13 @@ def fit_classes(
     ----------
     table : FeatureTable
     labels : numpy.ndarray [shape=(n_records,)]
-        Of each record.
+        Label of each record.
     blows : numpy.ndarray [shape=(n_records, n_channels)]
-        Of :func:`wearstate.diagnose.feature_rows.blows.blow_table`.
+        From :func:`wearstate.diagnose.feature_rows.blows.blow_table`.
     head : Attributes
-        Of the data set.
+        Attributes of the data set.
     target, seed
-        As of :func:`train_classes`.
+        As in :func:`train_classes`.
 
     Returns
     -------
@@ -396,7 +396,7 @@ def fit_classes(
 
 
 def _left_out_distances(table: FeatureTable, truth: Index, groups: Index, folds: Folds) -> Float:
-    """Of each record, from clouds that its recording had no part in."""
+    """Distance of each record from distributions fitted without its recording."""
     distance = np.empty(len(groups))
     for train, test in folds:
         clouds = _clouds(table, truth, groups, train)
@@ -407,12 +407,12 @@ def _left_out_distances(table: FeatureTable, truth: Index, groups: Index, folds:
 def _clouds(
     table: FeatureTable, truth: Index, groups: Index, rows: Index
 ) -> tuple[Familiarity, ...]:
-    """Cloud of each class by some rows; by all of them where a class has too few recordings."""
+    """Distribution of each class in some rows; of all rows for a class with too few recordings."""
     clouds = []
     for c in np.unique(truth):
         few = len(np.unique(groups[truth == c])) < FEWEST
-        here = rows if few else rows[truth[rows] == c]
-        clouds.append(fit_familiarity(table.names, table.values[here], groups[here]))
+        own = rows if few else rows[truth[rows] == c]
+        clouds.append(fit_familiarity(table.names, table.values[own], groups[own]))
     return tuple(clouds)
 
 
@@ -452,7 +452,7 @@ def evaluate_classes(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Judge a model on recordings that it has not seen.
+    """Evaluate a model on unseen recordings.
 
     Parameters
     ----------
@@ -460,7 +460,7 @@ def evaluate_classes(
     path : str or Path
         Data set with the model's label.
     seed : int
-        Of the resamples.
+        Seed of the resamples.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -469,13 +469,13 @@ def evaluate_classes(
     Returns
     -------
     dict
-        As :func:`score_votes`.
+        As from :func:`score_votes`.
 
     Raises
     ------
     DataError
-        The label is missing or has no value that the model knows, the features are others, or
-        every recording has a part in the training.
+        The label is missing or has no value that the model knows, the features differ, or every
+        recording was used in the training.
     """
     table = feature_table(
         path, choice=choice_in(model.card.feature_choice), jobs=jobs, progress=progress
@@ -493,7 +493,7 @@ def evaluate_classes(
     if rows.size == 0:
         raise DataError(
             f"{path}: 0 recordings of {', '.join(model.classes)} that the model has not seen, must "
-            "be > 0; train shows its accuracy on recordings left out"
+            "be > 0; train shows its accuracy on left-out recordings"
         )
     votes = Votes(
         shares=model.predict(table.values[rows]),
@@ -509,7 +509,7 @@ def evaluate_classes(
 
 
 def names_classes(path: str | Path, target: str) -> bool:
-    """Whether a column of a data set names classes: it is there, and of texts or whole numbers.
+    """Whether a column of a data set names classes: it exists, with texts or integers.
 
     Raises
     ------
@@ -526,7 +526,7 @@ def names_classes(path: str | Path, target: str) -> bool:
 
 
 def name_all(items: Sequence[Item], model: ClassModel) -> Iterator[tuple[str, Naming]]:
-    """Name the condition in recordings one after the other.
+    """Recognise the condition in recordings, one after the other.
 
     Parameters
     ----------
@@ -536,18 +536,18 @@ def name_all(items: Sequence[Item], model: ClassModel) -> Iterator[tuple[str, Na
     Yields
     ------
     (str, Naming)
-        Of each recording; one that cannot be read is unusable.
+        Name and result of each recording; one that cannot be read is unusable.
 
     Raises
     ------
     ModelError
-        The program's features are not the model's.
+        The features of this program are not those of the model.
     """
     for item in items:
         try:
             naming = model.estimate(item.load())
         except ModelError:
-            raise  # would be so for each of them
+            raise  # applies to every recording
         except (ValueError, OSError) as error:
             naming = Naming(verdict="unusable", reasons=(fault_of(item, error),), shares={})
         yield item.name, naming

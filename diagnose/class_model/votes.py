@@ -1,4 +1,4 @@
-"""Votes of a class model on recordings of known labels, and what they say of its accuracy."""
+"""Votes of a class model on labelled recordings, and its accuracy."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,25 +15,25 @@ from ..wear_model.estimate import UNFAMILIAR_SHARE
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-FEWEST = 3  # recordings of a class that is judged: one out, two to learn from
+FEWEST = 3  # recordings of an evaluated class: one left out, two for training
 
 
 @dataclass(frozen=True, kw_only=True)
 class Votes:
-    """Votes on the training records, of models that their recording had no part in.
+    """Votes on the training records, by models fitted without their recording.
 
     Attributes
     ----------
     shares : numpy.ndarray [shape=(n_records, n_classes)]
-        Rows of sum 1.
+        Rows with sum 1.
     label : numpy.ndarray [shape=(n_records,)]
-        Number of the class that is labelled.
+        Index of the labelled class.
     group : numpy.ndarray [shape=(n_records,)]
         Recording, or machine, of each record.
     distance : numpy.ndarray [shape=(n_records,)]
-        From the nearest of the classes' clouds, those of the other recordings.
+        Distance from the nearest class, fitted to the other recordings.
     blows : numpy.ndarray [shape=(n_records, n_channels)]
-        Score of the blows in each channel; without columns where records are too short for it.
+        Impact score of each channel; without columns if records are too short.
     """
 
     shares: Float
@@ -44,21 +44,21 @@ class Votes:
 
     @cached_property
     def groups_of(self) -> tuple[int, ...]:
-        """Recordings of each class."""
+        """Number of recordings of each class."""
         return tuple(
             len(np.unique(self.group[self.label == c])) for c in range(self.shares.shape[1])
         )
 
     @cached_property
     def p_limit(self) -> float:
-        """A recording with this p-value or a smaller one is called unfamiliar."""
+        """P-value at or below which a recording is unfamiliar."""
         return max(UNFAMILIAR_SHARE, 1 / (len(np.unique(self.group)) + 1))
 
     def p_value(self, distance: float) -> float:
-        """Conformal p-value of "this recording is of a trained class", recordings as the units.
+        """Conformal p-value of "this recording is of a trained class", by recordings.
 
-        Windows of one recording are no cases of their own: together they count as one, by the
-        share of them that lies as far.
+        Windows of one recording are not independent: together they count as one case, by the share
+        of them that is as far.
 
         Examples
         --------
@@ -79,30 +79,30 @@ class Votes:
 
     @cached_property
     def coverages(self) -> tuple[float, ...]:
-        """Coverage that the sets promise for each class: less where recordings are few.
+        """Nominal coverage of the sets for each class, lower with few recordings.
 
-        With m recordings of a class no method promises more than ``m / (m + 1)`` and excludes
-        anything; a class of too few to be judged is never excluded.
+        With m recordings of a class no method can guarantee more than ``m / (m + 1)`` and exclude
+        anything; a class with too few recordings is never excluded.
         """
         return tuple(min(COVERAGE, m / (m + 1)) if m >= FEWEST else 1.0 for m in self.groups_of)
 
     @cached_property
     def limits(self) -> Float:
-        """Least share with which each class is kept in a set [shape=(n_classes,)]."""
+        """Smallest share with which each class is kept in a set [shape=(n_classes,)]."""
         return np.array([self._limit(c) for c in range(self.shares.shape[1])])
 
     @cached_property
     def blow_floors(self) -> Float:
-        """Least score of the blows in each class's recordings [shape=(n_classes, n_channels)]."""
+        """Smallest impact score of each class's recordings [shape=(n_classes, n_channels)]."""
         mine = [self.label == c for c in range(self.shares.shape[1])]
-        return np.stack([blow_floors(self.blows[here], self.group[here]) for here in mine])
+        return np.stack([blow_floors(self.blows[own], self.group[own]) for own in mine])
 
     def lacking(self, blows: Float) -> tuple[int, ...]:
-        """Classes whose every recording has blows, where a recording of these scores has none."""
+        """Classes whose recordings all have impacts that a recording with these scores lacks."""
         return tuple(c for c, floors in enumerate(self.blow_floors) if lacks_blows(blows, floors))
 
-    def strange(self, shares: Float, distance: float, blows: Float) -> bool:
-        """Whether a recording is of none of the classes: too far, or without their blows."""
+    def is_unfamiliar(self, shares: Float, distance: float, blows: Float) -> bool:
+        """Whether a recording belongs to no class: too far, or without their impacts."""
         kept = set_of(shares, self.limits)
         return self.p_value(distance) <= self.p_limit or set(kept) <= set(self.lacking(blows))
 
@@ -116,7 +116,7 @@ class Votes:
 
 
 def set_of(shares: Float, limits: Float) -> tuple[int, ...]:
-    """Classes that cannot be excluded, the likeliest always among them.
+    """Classes that cannot be excluded, always including the likeliest.
 
     Parameters
     ----------
@@ -145,17 +145,17 @@ def score_votes(
     votes : Votes
     classes : tuple of str
     trained : Votes, optional
-        Of the training, by which sets and strangers are told; for each recording those of the
-        others unless given.
+        Votes of the training, which define sets and unfamiliarity; by default, for each recording,
+        those of the others.
     seed : int
-        Of the resamples.
+        Seed of the resamples.
 
     Returns
     -------
     dict
         Ready for JSON: ``records``, ``recordings``, ``judged`` (classes with enough recordings),
         ``accuracy``, ``coverage`` of the sets and ``mean_set_size`` over records of the judged
-        classes, ``called_unfamiliar``, the share of them that is refused as of none of the classes,
+        classes, ``called_unfamiliar``, the share of them that is refused as unfamiliar,
         under ``intervals`` their 95 % intervals over recordings; ``recordings_right`` of
         ``recordings_judged`` by majority of their records with the exact 95 % interval
         ``recordings_interval``; ``confusion`` (true class by row, of all records),
@@ -164,7 +164,7 @@ def score_votes(
     enough = np.array(votes.groups_of) >= (FEWEST if trained is None else 1)
     judged = enough[votes.label]
     found = votes.shares.argmax(axis=1)
-    kept, strange = _told(votes, trained)
+    kept, unfamiliar = _sets(votes, trained)
     draws = resampled(votes.group[judged], seed=seed)
     ones = np.ones(int(judged.sum()))
     inside = kept[np.arange(len(found)), votes.label]
@@ -172,7 +172,7 @@ def score_votes(
         "accuracy": share((found == votes.label)[judged], ones, draws),
         "coverage": share(inside[judged], ones, draws),
         "mean_set_size": share(kept[judged].sum(axis=1), ones, draws),
-        "called_unfamiliar": share(strange[judged], ones, draws),
+        "called_unfamiliar": share(unfamiliar[judged], ones, draws),
     }
     right, of = _recordings_right(votes, judged)
     matrix = np.zeros((len(classes), len(classes)), dtype=int)
@@ -180,7 +180,7 @@ def score_votes(
     return {
         "records": len(found),
         "recordings": len(np.unique(votes.group)),
-        "judged": [name for name, here in zip(classes, enough, strict=True) if here],
+        "judged": [name for name, flag in zip(classes, enough, strict=True) if flag],
         **{name: figure.value for name, figure in figures.items()},
         "intervals": {name: _ends(figure) for name, figure in figures.items()},
         "recordings_right": right,
@@ -197,20 +197,20 @@ def _ends(figure: ScoreFigure) -> list[float]:
     return [figure.low, figure.high]
 
 
-def _told(votes: Votes, trained: Votes | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Sets [shape=(n_records, n_classes)] and strangers [shape=(n_records,)].
+def _sets(votes: Votes, trained: Votes | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Sets [shape=(n_records, n_classes)] and unfamiliar records [shape=(n_records,)].
 
-    Without votes of a training, a recording is told by those of the others.
+    Without votes of a training, a recording is judged by those of the others.
     """
     kept = np.zeros(votes.shares.shape, dtype=bool)
-    strange = np.zeros(len(kept), dtype=bool)
+    unfamiliar = np.zeros(len(kept), dtype=bool)
     for group in np.unique(votes.group):
         mine = votes.group == group
         by = _without(votes, mine) if trained is None else trained
         for i in np.flatnonzero(mine):
             kept[i, list(set_of(votes.shares[i], by.limits))] = True
-            strange[i] = by.strange(votes.shares[i], votes.distance[i], votes.blows[i])
-    return kept, strange
+            unfamiliar[i] = by.is_unfamiliar(votes.shares[i], votes.distance[i], votes.blows[i])
+    return kept, unfamiliar
 
 
 def _without(votes: Votes, mine: NDArray[np.bool_]) -> Votes:
@@ -224,7 +224,7 @@ def _without(votes: Votes, mine: NDArray[np.bool_]) -> Votes:
 
 
 def _recordings_right(votes: Votes, judged: NDArray[np.bool_]) -> tuple[int, int]:
-    """Recordings whose mean votes name their class, of how many."""
+    """Number of recordings whose mean votes name their class, and of all."""
     groups = np.unique(votes.group[judged])
     means = np.array([votes.shares[votes.group == g].mean(axis=0) for g in groups])
     truth = np.array([votes.label[votes.group == g][0] for g in groups])
@@ -241,5 +241,5 @@ def _exact_interval(right: int, of: int) -> list[float]:
     """
     from scipy.stats import binomtest
 
-    told = binomtest(right, of).proportion_ci(0.95)
-    return [float(told.low), float(told.high)]
+    ends = binomtest(right, of).proportion_ci(0.95)
+    return [float(ends.low), float(ends.high)]

@@ -1,16 +1,15 @@
-"""The clearance of a journal bearing from where its journal runs: film equilibrium, inverted.
+"""Clearance of a journal bearing from the journal position, by inverting the film equilibrium.
 
-A loaded journal lies on its film where the film carries the load: under the same load it sinks the
-deeper the wider the bearing. Speed, load, viscosity and the bearing's size given, the mean readings
-of two probes tell the clearance, with no training at all. What is not known exactly is estimated
-along with it, held by how well it is known: the readings of a centred shaft, the probes'
-sensitivities, load and viscosity. Healthy recordings of the same machine share these numbers, and
-have the clearance of a machine as new: they tell the offsets of the probes.
+A loaded journal rests where its film carries the load: under the same load it sinks deeper in a
+wider bearing. Given speed, load, viscosity and bearing size, the mean readings of two probes
+determine the clearance without training. Uncertain data are estimated along with it, constrained by
+their uncertainties: readings of a centred shaft, sensitivities of the probes, load and viscosity.
+Healthy recordings of the same machine share these numbers and have the clearance as new, so that
+they determine the offsets of the probes.
 
-What the film is like is not known exactly either. A scar where the load presses lets the journal
-sink without a wider bore, and an end of the film that no theory has right lets it lie
-elsewhere. Other films are tried beside the scene's, and count by how well they explain the
-readings.
+The film itself is uncertain too. A scar in the loaded zone lets the journal sink without a wider
+bore, and the rupture of the film is not predicted exactly. Alternative films are therefore
+considered, weighted by how well they explain the readings.
 """
 
 import math
@@ -29,46 +28,46 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 COVERAGE = 0.9
-"""Of the interval, as that of the trained models."""
+"""Nominal coverage of the interval, as for trained models."""
 
 NORMAL = 1.6449  # standard deviations to either side of the middle 90 %
-CORRECTED = 10.0  # times its doubt: an offset that healthy recordings of known wear correct
-FLOOR = 0.2e-6  # m: mean of a record of some revolutions, and the curve's own error
-_MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has no place of rest
-_LOOSEST = 0.3  # standard error of the clearance's logarithm, above which nothing is told
-CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
+CORRECTED = 10.0  # widening of an offset's uncertainty, given healthy recordings of known wear
+FLOOR = 0.2e-6  # m: error of a mean over few revolutions, and of the curve
+_MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has no equilibrium
+_LOOSEST = 0.3  # largest standard error of the clearance's logarithm for an estimate
+CONTRADICTED = 2.6  # limit of the rms residual, in standard deviations, per free number
 OR_HEALTHY = (
     ", or give healthy recordings (--baseline): they separate offsets from a bore of another shape"
 )
-"""Cure of readings that nothing explains, where there are none."""
-_WIDEST, _NARROWEST = 10.0, 0.1  # clearance looked for, over that as new
+"""Cure for unexplained readings without healthy recordings."""
+_WIDEST, _NARROWEST = 10.0, 0.1  # range of the clearance, over that as new
 SCARS = tuple(
     (depth, math.radians(turned))
     for depth in (0.06, 0.13, 0.22, 0.33, 0.48)
     for turned in (-15.0, 0.0, 15.0)
 )
-"""Depths of scars that a bore may have, over the radial clearance; angles from the load [rad]."""
+"""Possible scars of a bore: depth over the radial clearance, and angle from the load [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Doubts:
-    """Standard uncertainties of what an estimate is told.
+    """Standard uncertainties of the input of an estimate.
 
     Attributes
     ----------
     load : float
-        Of each component, over the load. Belts are set by a gauge, a rotor is weighed: 5 %.
+        Each load component, relative. Belts are set by a gauge, a rotor is weighed: 5 %.
     viscosity : float
-        Over the viscosity. Oil loses 4 to 5 % a kelvin near 45 degrees Celsius, and the film is
-        warmer than the sump by what is known to two or three: 10 %.
+        Viscosity, relative. Oil loses 4 to 5 % per kelvin near 45 degrees Celsius, and the excess
+        temperature of the film over the sump is known within two or three kelvin: 10 %.
     offset : float
-        Of the reading of a centred shaft [m]. Gaps are set to some hundredths of a volt, and the
-        middle is found by lifting the shaft: half a per cent of the range, 5 um of 1 mm.
+        Reading of a centred shaft [m]. Gaps are set within some hundredths of a volt, and the
+        centre is found by lifting the shaft: half a per cent of the range, 5 um of 1 mm.
     gain : float
-        Of a probe's sensitivity, over it. API 670 allows 5 %, evenly spread: 3 %.
+        Sensitivity of a probe, relative. API 670 allows 5 %, uniformly distributed: 3 %.
     clearance : float
-        Of a diametral clearance that was measured [m]. Lead wire and plastic strips are read to
-        some hundredths of a millimetre: 5 um.
+        A measured diametral clearance [m]. Lead wire and plastic strips are read to some hundredths
+        of a millimetre: 5 um.
     """
 
     load: float = 0.05
@@ -84,7 +83,7 @@ DOUBTS = tuple(each.name for each in fields(Doubts))
 
 @dataclass(frozen=True, kw_only=True)
 class JournalRun:
-    """One recording, as the film sees it.
+    """Input of the film inversion from one recording.
 
     Attributes
     ----------
@@ -93,11 +92,11 @@ class JournalRun:
     swing : float
         rms of the motion about it [m].
     load : tuple of float
-        On the journal along X and Y, weight included [N].
+        Load on the journal along X and Y, including weight [N].
     film_force : float
-        ``eta omega R^3 L`` [N m^2], the film's force times the square of the clearance.
+        ``eta omega R^3 L`` [N m^2], force unit of the film times the square of the clearance.
     measured : float or None
-        Diametral clearance that was measured when it was recorded, of healthy recordings [m].
+        Diametral clearance measured at the time of a healthy recording [m].
     """
 
     readings: Float
@@ -109,24 +108,23 @@ class JournalRun:
 
 @dataclass(frozen=True, kw_only=True)
 class FilmEstimate:
-    """What the film equilibrium says of a recording.
+    """Estimate by the film equilibrium for a recording.
 
     Attributes
     ----------
     reason : str
-        Why nothing can be told; empty where there is an estimate.
+        Why there is no estimate; empty if there is one.
     severity, low, high : float or None
         Diametral clearance, or wear, and its interval [m].
     coverage : float
-        Nominal, of the interval, as far as the stated uncertainties hold.
+        Nominal coverage of the interval, if the stated uncertainties are correct.
     healthy : int
-        Recordings of the machine as new that it was told against.
+        Number of recordings of the machine as new.
     budget : dict
-        What each doubt is worth: its own part of half the interval [m], by the names of
-        :class:`Doubts`, and what film and bore are like where that is not known; their squares
-        add up to that of the whole.
+        Contribution of each uncertainty to half the interval [m], by the names of :class:`Doubts`,
+        and of unknown film and bore; the squares add up to that of the total.
     contradicted : bool
-        A journal is where no clearance puts it, so that something else is not as told.
+        No clearance explains the journal position, so that other input must be wrong.
     """
 
     reason: str = ""
@@ -149,23 +147,23 @@ def film_clearance(
     healthy: Sequence[JournalRun] = (),
     doubts: Doubts = USUAL_DOUBTS,
 ) -> FilmEstimate:
-    """Diametral clearance that puts the journal where it was measured.
+    """Diametral clearance that explains the measured journal position.
 
     Parameters
     ----------
     run : JournalRun
     curve : RestCurve
-        Of the bearing's film.
+        Equilibrium curve of the bearing's film.
     angles : sequence of float
-        Of the probes, from X in the direction of rotation [rad].
+        Angles of the probes, from X in the direction of rotation [rad].
     as_new : tuple of float
-        Least and largest diametral clearance of a healthy bearing of this kind [m].
+        Smallest and largest diametral clearance of a healthy bearing of this kind [m].
     others : sequence of PossibleFilm
-        What the film may be instead.
+        Alternative films.
     healthy : sequence of JournalRun
-        Of the same machine, with the clearance that was measured, else one within `as_new`.
+        Recordings of the same machine, with a measured clearance, or one within `as_new`.
     doubts : Doubts
-        How well it is known what is told.
+        Uncertainties of the input.
 
     Returns
     -------
@@ -174,18 +172,19 @@ def film_clearance(
     Notes
     -----
     Least squares over all readings, with the logarithms of the clearance now and as new, offset and
-    sensitivity of every probe, and of every recording factors of load and viscosity, each held by
-    its uncertainty; half of the variance of these factors, and of the clearance as new, is common
-    to all recordings, as an error of the nameplate is, the other half is that of the day. The
-    interval is that of the linearised problem. The mean of an orbit departs from the place of rest
-    by about its mean square over the clearance, which is counted as scatter.
+    sensitivity of every probe, and factors of load and viscosity of every recording, each
+    constrained by its uncertainty. Half of the variance of these factors, and of the clearance as
+    new, is common to all recordings, like an error of the nameplate, the other half is specific to
+    the day. The interval is that of the linearised problem. The mean of an orbit deviates from the
+    equilibrium by about its mean square over the clearance, which counts as scatter.
 
-    Of a bore with a scar it is the clearance across the scar, which a lift of the shaft or a lead
-    wire shows.
+    For a bore with a scar the result is the clearance across the scar, as a lift of the shaft or a
+    lead wire shows it.
 
-    Laminar and isothermal. A groove, a wrong direction of the load or a swapped probe put the
-    journal where no clearance explains it: that is said, not fitted. Without healthy recordings
-    the film as told must explain the readings: two probes do not tell a scar from their offsets.
+    The film is laminar and isothermal. With a groove, a wrong load direction or a swapped probe no
+    clearance explains the journal position: this is reported, not fitted. Without healthy
+    recordings the given film must explain the readings, because two probes cannot distinguish a
+    scar from their offsets.
 
     Examples
     --------
@@ -206,15 +205,15 @@ def film_clearance(
         return FilmEstimate(reason=reason)
     problem = _Problem(runs, np.asarray(angles), as_new, doubts)
     films = [PossibleFilm(likely=1.0, now=curve, new=curve), *others]
-    told = problem.solve(films[0], problem.start())
-    each = [told, *(problem.solve(film, told.values) for film in others)]
+    given = problem.solve(films[0], problem.start())
+    each = [given, *(problem.solve(film, given.values) for film in others)]
     found, weights = mixed_by_evidence(
         [film.across(problem.explained(one)) for film, one in zip(films, each, strict=True)],
         [one.cost for one in each],
         [film.likely for film in films],
     )
     if not healthy:
-        found = found._replace(left=told.left)
+        found = found._replace(left=given.left)
     likeliest = films[int(np.argmax(weights))]
     return _judged(problem, found, run, likeliest, len(healthy))
 
@@ -253,7 +252,7 @@ class _Problem:
             [self.middle, *(math.log(c / 2) for c in measured)] if known else [self.middle] * n
         )
         band = doubts.clearance / max(measured) if known else (high - low) / math.sqrt(12)
-        # a machine that is asked about may have any clearance: its prior says next to nothing
+        # the clearance of the judged machine is unknown: its prior is nearly flat
         day = math.sqrt(0.5)
         self.prior = np.concatenate(
             [
@@ -273,14 +272,14 @@ class _Problem:
         self.scatter = np.hypot(FLOOR, swing**2 / math.exp(self.middle))
 
     def predicted(self, free: Float, film: "PossibleFilm") -> Float:
-        """Readings [shape=(..., n, n_probes)] for deviations from what is told, in their doubts."""
+        """Readings [shape=(..., n, n_probes)] for deviations from the input, in uncertainties."""
         real = free * self.prior
         probes, n = self.probes, self.n
         new, offsets, gains, loads, oils = np.split(
             real[..., 1:], np.cumsum([n, probes, probes, 1 + n]), axis=-1
         )
-        apart = np.concatenate([real[..., :1], new[..., :1] + new[..., 1:]], axis=-1)
-        clearance = np.exp(self.middles + apart)
+        deviation = np.concatenate([real[..., :1], new[..., :1] + new[..., 1:]], axis=-1)
+        clearance = np.exp(self.middles + deviation)
         strength = self.film_force * np.exp(oils[..., :1] + oils[..., 1:]) / clearance**2
         load = self.load * (np.exp(loads[..., :1] + loads[..., 1:]) / strength)[..., None]
         rest = [film.now.position(load[..., :1, :]), film.new.position(load[..., 1:, :])]
@@ -289,12 +288,12 @@ class _Problem:
         return np.asarray(read * np.exp(gains)[..., None, :])
 
     def residuals(self, film: "PossibleFilm", free: Float) -> Float:
-        """Of readings, then of what is held, in standard deviations."""
-        apart = (self.predicted(free, film) - self.readings) / self.scatter[:, None]
-        return np.concatenate([apart.reshape(*free.shape[:-1], -1), free], axis=-1)
+        """Residuals of readings, then of the prior, in standard deviations."""
+        misfit = (self.predicted(free, film) - self.readings) / self.scatter[:, None]
+        return np.concatenate([misfit.reshape(*free.shape[:-1], -1), free], axis=-1)
 
     def start(self) -> Float:
-        """All as told, and a clearance in which the journal has room."""
+        """Initial values: the input as given, and a clearance that holds the journal position."""
         start = np.zeros(len(self.prior))
         radius = float(np.hypot(*np.linalg.lstsq(self.looks.T, self.readings[0], rcond=None)[0]))
         guess = max(1.3 * radius, math.exp(self.middle))
@@ -302,11 +301,11 @@ class _Problem:
         return start
 
     def solve(self, film: "PossibleFilm", start: Float) -> "FittedClearance":
-        """Deviations from what is told, if the film is this one."""
+        """Fit of the deviations from the input, for one film."""
         return fitted(partial(self.residuals, film), start, self.readings.size)
 
     def explained(self, found: "FittedClearance") -> "Explained":
-        """Logarithm of the clearance, of deviations."""
+        """Logarithm of the clearance from fitted deviations."""
         unit = float(self.prior[0])
         return Explained(
             value=self.middle + float(found.values[0]) * unit,
@@ -317,16 +316,16 @@ class _Problem:
 
 
 class PossibleFilm(NamedTuple):
-    """What the film of a machine may be.
+    """A possible film of a machine.
 
     Attributes
     ----------
     likely : float
-        Probability before the readings, over that of the film as told.
+        Prior probability, over that of the given film.
     now, new : RestCurve
-        Of the machine in question, and of the same when it was new.
+        Equilibrium curve of the machine at present, and when new.
     scar : float
-        Depth of that scar of the machine in question, over its radial clearance.
+        Depth of the present scar, over the radial clearance.
     """
 
     likely: float
@@ -335,21 +334,21 @@ class PossibleFilm(NamedTuple):
     scar: float = 0.0
 
     def across(self, found: "Explained") -> "Explained":
-        """The clearance across the scar, as a lead wire shows it, from that of the round bore."""
+        """Convert the clearance of the round bore to that across the scar, as by a lead wire."""
         return found._replace(value=found.value + math.log1p(self.scar / 2))
 
 
 class Explained(NamedTuple):
-    """How one bore or film explains the readings: what is asked for, and how sure that is.
+    """Result for one bore or film: the requested number and its uncertainty.
 
     Attributes
     ----------
     value, error : float
-        Number that is asked for, and its standard error.
+        Requested number, and its standard error.
     budget : dict
-        Parts of that error, by the names of :class:`Doubts`.
+        Contributions to that error, by the names of :class:`Doubts`.
     left : float
-        As of :class:`FittedClearance`.
+        As in :class:`FittedClearance`.
     """
 
     value: float
@@ -361,23 +360,23 @@ class Explained(NamedTuple):
 def mixed_by_evidence(
     each: Sequence[Explained], costs: Sequence[float], likely: Sequence[float]
 ) -> tuple[Explained, Float]:
-    """Of several bores, each by how well it explains the readings.
+    """Mixture of several bores, weighted by how well they explain the readings.
 
-    The weight is its probability before, times its likelihood, times the range of the value that
-    it allows: nearly its evidence by Laplace's method.
+    The weight is the prior probability times the likelihood times the standard error of the value:
+    nearly the evidence by Laplace's method.
 
     Parameters
     ----------
     each : sequence of Explained
     costs : sequence of float
-        Half the sum of squares that each leaves.
+        Half the residual sum of squares of each.
     likely : sequence of float
-        Probability of each before the readings, up to a factor.
+        Prior probability of each, up to a factor.
 
     Returns
     -------
     Explained
-        Its budget has film and bore as well, where there is more than one.
+        Its budget includes film and bore if there is more than one.
     weights : numpy.ndarray [shape=(n,)]
 
     Examples
@@ -412,18 +411,18 @@ def mixed_by_evidence(
 
 @dataclass(frozen=True, kw_only=True)
 class FittedClearance:
-    """Least squares of readings and of what is held.
+    """Least-squares fit of readings and prior.
 
     Attributes
     ----------
     values : numpy.ndarray [shape=(n,)]
-        Numbers found.
+        Fitted numbers.
     covariance : numpy.ndarray [shape=(n,)]
-        Of the first number with each.
+        Covariance of the first number with each.
     cost : float
-        Half of the residuals' sum of squares.
+        Half the sum of squared residuals.
     left : float
-        Root mean square of the residuals per reading beyond the first, in standard deviations.
+        Rms of the residuals per reading beyond the first, in standard deviations.
     """
 
     values: Float
@@ -437,17 +436,17 @@ class FittedClearance:
         return math.sqrt(self.covariance[0])
 
     def worth(self, names: Sequence[str], name: str) -> float:
-        """Part of that error which is due to what is held under a name.
+        """Contribution to that error by the prior of a name.
 
-        The first number moves by its covariance with another where the value at which that one
-        is held moves by its standard deviation.
+        The first number changes by its covariance with another if the prior mean of that one
+        changes by its standard deviation.
         """
         mine = [part for part, own in zip(self.covariance, names, strict=True) if own == name]
         return math.hypot(*mine)
 
 
 def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -> FittedClearance:
-    """Numbers with the least residuals, which are in standard deviations.
+    """Least-squares fit of numbers to residuals in standard deviations.
 
     Parameters
     ----------
@@ -459,7 +458,7 @@ def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -
     """
 
     def slopes(free: Float) -> Float:
-        # all at once: one call costs as much as one of its rows
+        # vectorised: one call takes as long as one of its rows
         ends = residuals(free + _STEP * np.array([1, -1])[:, None, None] * np.eye(free.size))
         return np.asarray((ends[0] - ends[1]).T / (2 * _STEP))
 
@@ -483,7 +482,7 @@ def _judged(
     reason = _contradiction(problem, found, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy, contradicted=True)
-    reason = _untold(problem, found, run, film, clearance)
+    reason = _rejection(problem, found, run, film, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy)
     spread = math.exp(NORMAL * found.error)
@@ -497,10 +496,10 @@ def _judged(
 
 
 def _contradiction(problem: _Problem, found: Explained, clearance: float) -> str:
-    """That nothing explains the readings; empty where something does."""
+    """Reason if no clearance explains the readings; else empty."""
     ratio = clearance / math.exp(problem.middle)
     if not found.left <= CONTRADICTED:
-        why = f"{found.left:.1f} standard deviations are left, must be <= {CONTRADICTED:g}"
+        why = f"{found.left:.1f} standard deviations remain, must be <= {CONTRADICTED:g}"
     elif not _NARROWEST < ratio < _WIDEST:
         why = (
             f"it would be {ratio:.3g} times that as new, must be > {_NARROWEST:g} and < {_WIDEST:g}"
@@ -508,19 +507,19 @@ def _contradiction(problem: _Problem, found: Explained, clearance: float) -> str
     else:
         return ""
     return (
-        f"no clearance puts the journal where the probes see it: {why}; check load, its direction, "
+        f"no clearance explains the journal position: {why}; check load, its direction, "
         f"viscosity and the probes{OR_HEALTHY if problem.n == 1 else ''}"
     )
 
 
-def _untold(
+def _rejection(
     problem: _Problem, found: Explained, run: JournalRun, film: PossibleFilm, clearance: float
 ) -> str:
-    """Why a solution that explains the readings is no estimate; empty where it is one."""
+    """Why a solution that explains the readings is not used; empty if it is."""
     if run.swing > _MOST_SWING * clearance:
         return (
             f"the orbit's rms is {run.swing / clearance:.2f} of the radial clearance, must be <= "
-            f"{_MOST_SWING:g}: a whirling journal has no place of rest"
+            f"{_MOST_SWING:g}: a whirling journal has no equilibrium position"
         )
     round_bore = clearance / (1 + film.scar / 2)
     load = math.hypot(*run.load) * round_bore**2 / float(problem.film_force[0])

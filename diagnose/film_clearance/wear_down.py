@@ -1,12 +1,12 @@
-"""The wear-down of a shaft's bearing from where its journal runs: alignment and films, inverted.
+"""Wear-down of a shaft's bearing from the journal position, by inverting alignment and films.
 
-A worn bearing lets its journal sink; how deep it lies hangs on the film under it, too, and on what
-the line loads it with. Beam and films are solved together for some wear-downs, each with a little
-more viscosity and a little more clearance: that gives the readings of the probes as functions of
-what is not known exactly, and least squares as those of a single journal do the rest.
+A worn bearing lets its journal sink; its height also depends on the film and on the load from the
+line. Beam and films are solved together for several wear-downs, each also with slightly higher
+viscosity and clearance. This gives the readings of the probes as functions of the uncertain
+numbers, which are fitted by least squares as for a single journal.
 
-The shape of the worn bore is not known: it may be a circle still, or have an arc, and grooves. Each
-of these is tried, and counts by how well it explains the readings.
+The shape of the worn bore is unknown: still a circle, or with an arc, and with or without grooves.
+All are considered, weighted by how well they explain the readings.
 """
 
 import math
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
-_SHARES = (0.0, 0.25, 0.6, 1.0, 1.5)  # of the condemning wear-down, where the line is solved
-_HEALTHY = (0.0, 0.1, 0.25)  # the same for a healthy bearing
+_SHARES = (0.0, 0.25, 0.6, 1.0, 1.5)  # of the condemning wear-down: solved cases
+_HEALTHY = (0.0, 0.1, 0.25)  # the same, for a healthy bearing
 _ARCS = (0.25, 0.5, 0.9)  # clearance in a worn arc over that of the bore
 _GROOVES = (math.radians(14.0), math.radians(32.0))  # widths at the sides, the same
 _CHANGE = 0.05  # of viscosity and clearance, for their slopes
-_BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, evenly spread
-_LOOSEST = 0.3  # standard error over the condemning wear-down, above which nothing is told
-_BEYOND = 1.5  # of the condemning wear-down: the line was not solved farther
+_BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, uniformly distributed
+_LOOSEST = 0.3  # largest standard error over the condemning wear-down for an estimate
+_BEYOND = 1.5  # of the condemning wear-down: largest solved case
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,19 +56,19 @@ class SinkingRun:
     Attributes
     ----------
     readings : numpy.ndarray [shape=(n_probes,)]
-        Mean motion towards each probe, zero in the middle of the bore as new [m].
+        Mean motion towards each probe, zero at the centre of the bore as new [m].
     places : tuple of CubicSpline or None
         For each bore of :func:`possible_bores`: wear-down [m] -> height and side of the journal
-        [m], their slopes by the logarithm of the viscosity, and by that of the clearance as new.
-        None for a bore that carries no line.
+        [m], their derivatives with respect to the logarithms of viscosity and clearance as new.
+        None for a bore without an equilibrium.
     likely : tuple of float
-        Probability of each bore before the readings.
+        Prior probability of each bore.
     swing : float
         rms of the motion about the mean [m].
     clearance : float
-        Radial, as new [m].
+        Radial clearance as new [m].
     measured : float or None
-        Wear-down that was measured when it was recorded, of healthy recordings [m].
+        Wear-down measured at the time of a healthy recording [m].
     """
 
     readings: Float
@@ -80,7 +80,7 @@ class SinkingRun:
 
 
 def possible_bores(bearing: "ShaftBearing") -> tuple[tuple[float, dict[str, Any]], ...]:
-    """What a worn bearing's bore may be: that of the scene, and others where it tells none.
+    """Possible bores of a worn bearing: that of the scene, and others if it defines none.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def possible_bores(bearing: "ShaftBearing") -> tuple[tuple[float, dict[str, Any]
     Returns
     -------
     tuple of (float, dict)
-        Probability before anything is read, and fields of the bearing that are changed; nothing in
-        the first. An arc is as likely as a circle, grooves are as likely as none.
+        Prior probability, and changed fields of the bearing, empty in the first. An arc is as
+        likely as a circle, grooves are as likely as none.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def possible_bores(bearing: "ShaftBearing") -> tuple[tuple[float, dict[str, Any]
 
 
 def _even(others: Sequence[dict[str, Any]]) -> list[tuple[float, dict[str, Any]]]:
-    """As the scene has it, half of the probability, or one of the others."""
+    """The case of the scene with half of the probability, and the others."""
     if not others:
         return [(1.0, {})]
     return [(0.5, {}), *((0.5 / len(others), other) for other in others)]
@@ -120,27 +120,27 @@ def _even(others: Sequence[dict[str, Any]]) -> list[tuple[float, dict[str, Any]]
 def sinking_places(
     scene: "ShaftScene", bearing: int, limit: float, *, healthy: bool = False
 ) -> tuple[CubicSpline | None, ...] | str:
-    """Where a journal lies, by the wear-down of its bearing.
+    """Position of a journal as a function of the wear-down of its bearing.
 
     Parameters
     ----------
     scene : ShaftScene
-        With the conditions of the day.
+        Scene with the conditions of the day.
     bearing : int
-        Its number, from aft.
+        Number of the bearing, from aft.
     limit : float
         Condemning wear-down [m].
     healthy : bool
-        Of a bearing with little wear only.
+        Only for a bearing with little wear.
 
     Returns
     -------
     tuple of (CubicSpline or None), or str
-        As :class:`SinkingRun` has them; or why the line as the scene has it has no balance.
+        As in :class:`SinkingRun`; or why the line of the scene has no equilibrium.
 
     Notes
     -----
-    Viscosity and clearance as new are taken to move the journal alike in every bore.
+    Viscosity and clearance as new are assumed to have the same effect in every bore.
     """
     from ...sim.shaft_films.status import ShaftFilmError
 
@@ -167,7 +167,7 @@ def sinking_places(
 
 
 def _ways(scene: "ShaftScene", bearing: int, wears: Sequence[float]) -> Float:
-    """Heights and sides over the middle of the bore as new [m, shape=(n_wears, 2)]."""
+    """Heights and sides relative to the centre of the bore as new [m, shape=(n_wears, 2)]."""
     from ...sim.shaft.at_rest import film_bearings
     from ...sim.shaft.line_beam import running_beam
     from ...sim.shaft_films.on_oil_films import beam_film
@@ -211,18 +211,18 @@ def film_wear_down(
     *,
     healthy: Sequence[SinkingRun] = (),
 ) -> FilmEstimate:
-    """Wear-down that puts the journal where it was measured.
+    """Wear-down that explains the measured journal position.
 
     Parameters
     ----------
     run : SinkingRun
     angles : sequence of float
-        Of the probes, from straight down in the direction of rotation [rad].
+        Angles of the probes, from straight down in the direction of rotation [rad].
     limit, as_new : float
-        Condemning wear-down, and that after running in [m].
+        Condemning wear-down, and wear-down after running in [m].
     doubts : Doubts
     healthy : sequence of SinkingRun
-        Of the same machine: with the wear-down that was measured, else that of a new bearing.
+        Recordings of the same machine, with a measured wear-down, or that of a new bearing.
 
     Returns
     -------
@@ -230,9 +230,9 @@ def film_wear_down(
 
     Notes
     -----
-    As :func:`.film_clearance.clearance.film_clearance`, linear in viscosity and clearance. Loads
-    are those of the nameplate and of the day's thrust and hull; sags of other bearings are not
-    looked for. The bores of :func:`possible_bores` are mixed by their evidence.
+    As :func:`.film_clearance.clearance.film_clearance`, but linear in viscosity and clearance.
+    Loads follow from the nameplate and from the day's thrust and hull; sags of other bearings are
+    not estimated. The bores of :func:`possible_bores` are mixed by their evidence.
     """
     problem = _Problem([run, *healthy], np.asarray(angles), limit, as_new, doubts)
     found = problem.explained()
@@ -240,8 +240,8 @@ def film_wear_down(
     if not found.left <= CONTRADICTED:
         return FilmEstimate(
             healthy=len(healthy),
-            reason=f"no wear-down puts the journal where the probes see it: {found.left:.1f} "
-            f"standard deviations are left, must be <= {CONTRADICTED:g}; check thrust, hull, oil "
+            reason=f"no wear-down explains the journal position: {found.left:.1f} "
+            f"standard deviations remain, must be <= {CONTRADICTED:g}; check thrust, hull, oil "
             f"and the probes{'' if healthy else OR_HEALTHY}",
         )
     if error > _LOOSEST * limit or wear > _BEYOND * limit:
@@ -274,15 +274,14 @@ class _Problem:
         n, probes = len(runs), len(angles)
         self.runs, self.n, self.probes = runs, n, probes
         self.readings = np.array([run.readings for run in runs])
-        # height and side are those of the shaft line, the probes look from straight down
+        # heights and sides refer to the shaft line, probe angles to straight down
         self.looks = -np.stack([np.cos(angles), np.sin(angles)])
         measured = [run.measured for run in runs[1:] if run.measured is not None]
         known = len(measured) == n - 1 > 0
         self.middles = np.array([limit / 2, *(measured if known else [as_new] * (n - 1))])
         offset = doubts.offset * (CORRECTED if n > 1 else 1)
-        day = math.sqrt(
-            0.5
-        )  # half of the variance of wear as new and of the oil is that of the day
+        # half of the variance of wear as new and of the oil is specific to the day
+        day = math.sqrt(0.5)
         new = day * (doubts.clearance if known else as_new)
         self.prior = np.array(
             [
@@ -302,9 +301,9 @@ class _Problem:
         self.scatter = np.array([math.hypot(FLOOR, run.swing**2 / run.clearance) for run in runs])
 
     def explained(self) -> Explained:
-        """By all bores that carry the line in every run.
+        """Mixture of all bores with an equilibrium in every run.
 
-        Without healthy runs a bore of another shape explains what is an offset of the probes: the
+        Without healthy runs a bore of another shape could explain an offset of the probes: the
         scene's own bore must then explain the readings.
         """
         each, costs, likely = [], [], []
@@ -328,19 +327,19 @@ class _Problem:
             budget={
                 name: unit * found.worth(self.names, name)
                 for name in DOUBTS
-                if name != "load"  # of a line: by its masses, thrust and hull
+                if name != "load"  # loads of a line follow from masses, thrust and hull
             },
             left=found.left,
         )
         return explained, found.cost
 
     def predicted(self, ways: Sequence[Any], free: Float) -> Float:
-        """Readings [shape=(..., n, n_probes)] for deviations from what is told, in their doubts."""
+        """Readings [shape=(..., n, n_probes)] for deviations from the input, in uncertainties."""
         real = free * self.prior
         probes, n = self.probes, self.n
         offsets, gains, new, oils = np.split(real[..., 2:], np.cumsum([probes, probes, n]), axis=-1)
-        apart = np.concatenate([real[..., :1], new[..., :1] + new[..., 1:]], axis=-1)
-        wear = self.middles + apart
+        deviation = np.concatenate([real[..., :1], new[..., :1] + new[..., 1:]], axis=-1)
+        wear = self.middles + deviation
         found = np.stack([way(wear[..., i]) for i, way in enumerate(ways)], axis=-2)
         oil = (oils[..., :1] + oils[..., 1:])[..., None]
         place = found[..., :2] + found[..., 2:4] * oil + found[..., 4:] * real[..., 1:2, None]
@@ -348,6 +347,6 @@ class _Problem:
         return np.asarray(read * np.exp(gains)[..., None, :])
 
     def residuals(self, ways: Sequence[Any], free: Float) -> Float:
-        """Of readings, then of what is held, in standard deviations."""
-        apart = (self.predicted(ways, free) - self.readings) / self.scatter[:, None]
-        return np.concatenate([apart.reshape(*free.shape[:-1], -1), free], axis=-1)
+        """Residuals of readings, then of the prior, in standard deviations."""
+        misfit = (self.predicted(ways, free) - self.readings) / self.scatter[:, None]
+        return np.concatenate([misfit.reshape(*free.shape[:-1], -1), free], axis=-1)

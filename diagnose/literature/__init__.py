@@ -1,4 +1,4 @@
-"""Checks of the physics against literature, beside the expected values.
+"""Checks of the physics against the literature, with the expected values.
 
 It may import ``sim.jit``, ``sim.scene``, ``sim.contact``, ``sim.film``, ``sim.bearing``,
 ``sim.beam``, ``sim.alignment``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``,

@@ -1,4 +1,4 @@
-"""Literature checks: what the physics must give, what it gives, and whether that is close enough.
+"""Literature checks: expected values, computed values, and whether they agree.
 
 Expected values, tolerances and sources stand in ``literature/*.csv``, one line per check; the
 function that obtains the value stands under the same name in a table of ``verify_*.py``.
@@ -23,7 +23,7 @@ LITERATURE_FOLDER = Path(__file__).parent
 
 @dataclass(frozen=True, kw_only=True)
 class LiteratureCheck:
-    """One value of the literature and how to obtain it here.
+    """One value of the literature and how to compute it.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class LiteratureCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """Outcome of one check; the check's fields, the value obtained, and the verdict."""
+    """Outcome of one check: its fields, the computed value and the verdict."""
 
     name: str
     expected: float
@@ -84,7 +84,7 @@ def checks() -> tuple[LiteratureCheck, ...]:
 
 
 def run_checks() -> list[Result]:
-    """Obtain every value and compare it with the literature.
+    """Compute every value and compare it with the literature.
 
     Returns
     -------
@@ -158,4 +158,4 @@ _TABLES: dict[str, dict[str, Callable[[], float]]] = {
     "shaft_line.csv": shaft_checks(),
     "alignment.csv": alignment_checks(),
 }
-"""File of the literature -> name of each of its checks -> what obtains it."""
+"""File of the literature -> name of each of its checks -> function that computes it."""

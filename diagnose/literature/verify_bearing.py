@@ -33,11 +33,11 @@ _LINES = ((0.9, 144), (0.97, 288), (1.0, 720))  # up to an eccentricity; mesh er
 
 @cache
 def _film(motion: str, eccentricity: float, ratio: float) -> FilmSolution:
-    """Journal at X = e that turns, from the widest gap, or is pushed along X without turning."""
+    """Journal at X = e that rotates, its film from the widest gap, or is pushed along X."""
     lines = next(count for most, count in _LINES if eccentricity <= most)
     condition = "reynolds" if motion == "rotation" else "periodic"
     geometry = FilmGeometry(length_to_diameter=ratio, n_theta=lines, n_z=33, condition=condition)
-    # the drag of the rotation is that of a velocity of -e / 2 across
+    # the wedge effect of the rotation is that of a velocity of -e / 2 across
     rates = (0.0, 0.0) if motion == "rotation" else (1.0, eccentricity / 2)
     state = FilmState(x=eccentricity, y=0.0, x_rate=rates[0], y_rate=rates[1])
     return solve_direct(geometry, state)
@@ -76,7 +76,7 @@ def _grooved_value(s: float, quantity: str) -> float:
 
 
 def finite_bearing_checks() -> dict[str, Callable[[], float]]:
-    """Name of each check -> what obtains its value."""
+    """Name of each check -> function that computes its value."""
     table: dict[str, Callable[[], float]] = {}
     for motion, eccentricities in (("rotation", _ROTATION), ("squeeze", _SQUEEZE)):
         for e in eccentricities:

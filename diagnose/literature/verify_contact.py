@@ -1,4 +1,4 @@
-"""Literature checks of contacts: what an impact keeps of its speed, Hertz's stiffness."""
+"""Literature checks of contacts: restitution of an impact, Hertz's stiffness."""
 
 import math
 from collections.abc import Callable
@@ -30,7 +30,7 @@ _LONGEST_DROP = 1000.0  # contact times; the slowest rebound of the table is ove
 def impact(
     contact: np.void, *, speed: float = _APPROACH_SPEED, step: float, duration: float
 ) -> float:
-    """Coefficient of restitution that the mechanism itself gives for one straight impact.
+    """Coefficient of restitution of the mechanism itself in one straight impact.
 
     The rod lies along the stroke with the crank at rest, without gravity, pressure or friction,
     so that rod and piston are one mass of 9 kg which runs against the pin.
@@ -84,7 +84,7 @@ _STRAIGHT = {
     "crankpin_radius": 0.03,
     "guide_half_height": 1.0,
 }
-"""A pump of 300 rpm in size; a law's restitution does not depend on it."""
+"""Typical of a pump at 300 rpm; the restitution of a law does not depend on it."""
 
 
 def rebound(damping_ratio: float, release: int, *, step_per_contact_time: float = 0.03) -> float:
@@ -142,7 +142,7 @@ def _slowing(penetration: float, velocity: float, speed: float, contact: Any) ->
 
 @kernel
 def _drop(speed: float, h: float, n_steps: int, contact: Any) -> float:
-    """Velocity at which a unit mass leaves, by Runge-Kutta 4; NaN where it does not.
+    """Velocity at which a unit mass leaves, by Runge-Kutta 4; NaN if it does not.
 
     Order 4 with a linear elasticity, 2.5 with those that start as d^(3/2).
     """
@@ -205,7 +205,7 @@ def _benchmark_hertz(clearance: float) -> float:
 
 
 def restitution_checks() -> dict[str, Callable[[], float]]:
-    """Checks of the speed kept by an impact of the linear contact."""
+    """Checks of the restitution of the linear contact."""
     return {
         f"restitution: damping ratio {ratio:g}, release at zero {name}": partial(
             rebound, ratio, code

@@ -70,7 +70,7 @@ def _largest_crank_moment() -> float:
 
 
 def one_throw(numbers: dict[str, float], contacts: dict[int, np.void], **machine: float) -> Tables:
-    """Tables of one throw without pressure; what is not given is zero."""
+    """Tables of one throw without pressure; values not given are zero."""
     throws, table = np.zeros(1, THROW), np.zeros((1, 3), CONTACT)
     table["friction_speed"] = table["speed_floor"] = 1.0  # an unused record divides by neither
     for name, value in numbers.items():

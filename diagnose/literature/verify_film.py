@@ -100,7 +100,7 @@ def _film_geometry(
 
 
 def _carried(film: FilmSolution, direction: float) -> dict[str, float]:
-    """What a film carries; its journal centre lies in the given direction [rad]."""
+    """Load quantities of a film whose journal centre lies in the given direction [rad]."""
     force = math.hypot(*film.force)
     attitude = direction - math.atan2(-film.force[1], -film.force[0])
     peak = float(film.pressure.max())
@@ -143,7 +143,7 @@ def _infinite_bearing(eccentricity: float) -> dict[str, float]:
 
 @cache
 def _worn_bearing(length_to_diameter: float, eccentricity: float, depth: float) -> dict[str, float]:
-    """With the scar where the load points to: turned until it is so."""
+    """Film with the scar in the direction of the load, found by iteration."""
     geometry = _film_geometry(length_to_diameter, bore=dufrane_scar(depth, 0.0, _FILM_LINES))
 
     def at(direction: float) -> dict[str, float]:

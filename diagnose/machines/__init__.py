@@ -1,4 +1,4 @@
-"""How each machine is shown, and what of it a model takes for granted.
+"""Presentation of each machine, and the assumptions that a model makes about it.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.shaft``, ``features.signal``,
 ``features.rotation``, ``datasets.generation``, ``diagnose.pages``, ``diagnose.pictures``.

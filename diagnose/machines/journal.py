@@ -1,4 +1,4 @@
-"""How a journal bearing is shown, and what of it a model takes for granted."""
+"""Presentation of a journal bearing, and the assumptions that a model makes about it."""
 
 import math
 from collections.abc import Iterator
@@ -13,14 +13,14 @@ from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene
 from ..pages.si_text import plain
 from ..pictures.panel import COLOURS
-from .presentation import Presentation, Truths, Unseen, label, told
+from .presentation import Presentation, Truths, Unseen, label, value_text
 from .shifts import add, factor, set_to
 
 _MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
 
 def _draw_journal(figure: Any, scene: Scene, solution: Recording) -> None:
-    """What the figures of Ma, Lu, Chen (2010) show, over tau, and the spectrum of the orbit."""
+    """Draw the quantities of Ma, Lu, Chen (2010) over tau, and the spectrum of the orbit."""
     journal = cast(JournalScene, scene)
     truth = solution.truth
     panels = figure.subplot_mosaic(
@@ -46,7 +46,7 @@ def _pair(axes: Any, tau: NDArray[Any], columns: NDArray[Any], names: tuple[str,
 
 
 def _clearance_circle(axes: Any, place: NDArray[Any]) -> None:
-    """Orbit in the unit circle, X downwards as the load points, Y to the right."""
+    """Draw the orbit in the unit circle, X downwards along the load, Y to the right."""
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
     axes.plot(circle.real, circle.imag, color="black", lw=1)
     axes.plot(place[:, 1], place[:, 0], lw=0.6, color=COLOURS[0])
@@ -65,22 +65,22 @@ def _film(
     scene: JournalScene,
     truth: dict[str, NDArray[Any]],
 ) -> None:
-    """Peak pressure, where the rung knows it, and the thinnest film on an axis of its own."""
+    """Draw peak pressure, if the rung has it, and minimum film thickness on a second axis."""
     if "peak_pressure_pa" in truth:
         peak = truth["peak_pressure_pa"] / 1e6
         axes.plot(tau, peak, lw=0.8, color=COLOURS[0], label="peak pressure")
     label(axes, "τ = ωt", "peak pressure [MPa]", "Film: peak pressure, least thickness")
-    beside = axes.twinx()
+    second = axes.twinx()
     thin = truth["min_film_m"] / scene.bearing.clearance_radial
-    beside.plot(tau, thin, lw=0.8, color=COLOURS[1], label="least thickness")
-    beside.set_ylabel("least thickness over C")
-    beside.set_ylim(0, None)
-    beside.margins(x=0)
-    beside.legend(fontsize=8, loc="lower right")
+    second.plot(tau, thin, lw=0.8, color=COLOURS[1], label="least thickness")
+    second.set_ylabel("least thickness over C")
+    second.set_ylim(0, None)
+    second.margins(x=0)
+    second.legend(fontsize=8, loc="lower right")
 
 
 def _full_spectrum(axes: Any, scene: JournalScene, solution: Recording) -> None:
-    """Radii of forward and backward motion over the order, from the true orbit."""
+    """Draw radii of forward and backward motion over the order, from the true orbit."""
     path = 1e6 * (solution.truth["journal_m"] @ np.array([1.0, 1.0j]))
     frequency, vector = full_spectrum(path, solution.sample_rate)
     order = frequency / scene.drive.speed
@@ -95,21 +95,24 @@ def _full_spectrum(axes: Any, scene: JournalScene, solution: Recording) -> None:
 def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
     place = f"mean eccentricity ratio {plain(truth['eccentricity'].value)}"
     if "attitude_angle" in truth:
-        place += f", attitude angle {told(truth, 'attitude_angle')}"
+        place += f", attitude angle {value_text(truth, 'attitude_angle')}"
     yield "journal", place
     yield (
         "orbit",
-        f"{told(truth, 'orbit_rms')} rms, {told(truth, 'orbit_largest')} at most from there",
+        f"{value_text(truth, 'orbit_rms')} rms, at most "
+        f"{value_text(truth, 'orbit_largest')} from there",
     )
-    pressure = f"; peak pressure {told(truth, 'pressure_peak')}" if "pressure_peak" in truth else ""
-    yield "film", f"thinnest {told(truth, 'film_least')}{pressure}"
+    pressure = ""
+    if "pressure_peak" in truth:
+        pressure = f"; peak pressure {value_text(truth, 'pressure_peak')}"
+    yield "film", f"thinnest {value_text(truth, 'film_least')}{pressure}"
 
 
 _DEGREE = math.radians(1.0)
 
 _SHIFTS = (
     factor("load.static", 0.7, 1.4, "belt tension, gear load"),
-    add("load.static_across", -1500.0, 1500.0, "the load does not point where it is taken to"),
+    add("load.static_across", -1500.0, 1500.0, "the load has another direction than assumed"),
     set_to(
         "bearing.inlet_fill",
         (0.6,),
@@ -124,11 +127,11 @@ _SHIFTS = (
     factor("rotor.unbalance", 0.3, 3.0, "another balance quality"),
     factor("rotor.run_out.*.amplitude", 0.2, 3.0, "another track"),
     factor("rotor.dents.*.depth", 0.2, 3.0, "another track"),
-    add("sensors.*.offset", -1e-5, 1e-5, "the gap at rest in the middle is not known"),
-    add("sensors.*.angle", -5 * _DEGREE, 5 * _DEGREE, "probes beside their place"),
+    add("sensors.*.offset", -1e-5, 1e-5, "the gap of a centred shaft is unknown"),
+    add("sensors.*.angle", -5 * _DEGREE, 5 * _DEGREE, "probes off their nominal position"),
     factor("sensors.*.gain", 0.9, 1.1, "another steel under the probe"),
-    set_to("film.rung", ("short",), "a film solved without its length"),
-    set_to("film.condition", ("guembel", "reynolds", "periodic"), "where the film ends"),
+    set_to("film.rung", ("short",), "short-bearing film"),
+    set_to("film.condition", ("guembel", "reynolds", "periodic"), "rupture of the film"),
 )
 
 _UNSEEN = (  # measured: docs/evaluation.md, and docs/decisions/027-starved-inlet.md

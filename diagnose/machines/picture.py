@@ -1,4 +1,4 @@
-"""Pictures of a simulated recording. Always says that it is simulated."""
+"""Pictures of a simulated recording, always marked as simulated."""
 
 from pathlib import Path
 
@@ -10,13 +10,13 @@ from .registry import presentation_of
 
 
 def plot_simulation(scene: Scene, solution: Recording, path: Path, *, force: bool = True) -> None:
-    """Draw a simulated recording with what its sensors do not see: forces, pressures, orbits.
+    """Draw a simulated recording with forces, pressures and orbits that sensors do not show.
 
     Parameters
     ----------
     scene : Scene
     solution : Recording
-        With truth.
+        Recording with truth.
     path : Path
         ``.png``, ``.svg`` or ``.pdf``.
     force : bool
@@ -25,7 +25,7 @@ def plot_simulation(scene: Scene, solution: Recording, path: Path, *, force: boo
     Raises
     ------
     DataError
-        Another suffix.
+        The suffix is none of these.
     """
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""What the pages, pictures and texts of any machine ask of it."""
+"""Machine-specific parts of pages, pictures and texts."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ Truths = Mapping[str, Truth]
 
 
 def label(axes: Any, x: str, y: str, title: str) -> None:
-    """Name axes and curves."""
+    """Label axes and curves."""
     axes.set(xlabel=x, ylabel=y, title=title)
     axes.grid(alpha=0.3)
     axes.margins(x=0)
@@ -34,13 +34,13 @@ def density(row: NDArray[np.float32], rate: float) -> tuple[NDArray[Any], NDArra
     return frequency[1:], decibel(density[1:])
 
 
-def told(truth: Truths, name: str) -> str:
-    """One number of a run with its unit."""
+def value_text(truth: Truths, name: str) -> str:
+    """A number of a run with its unit."""
     return si_text(truth[name].value, truth[name].unit)
 
 
 def draw_signals(figure: Any, _scene: Scene, solution: Recording) -> None:
-    """Signals over time and their spectra, of a machine that says nothing of what to draw."""
+    """Draw signals over time and their spectra, for a machine without a picture of its own."""
     time = np.arange(solution.signal.shape[1]) / solution.sample_rate
     shown = {c.name: (c, row) for c, row in zip(solution.channels, solution.signal, strict=True)}
     units = dict.fromkeys(c.unit for c, _ in shown.values() if c.quantity != "tacho")
@@ -55,24 +55,24 @@ def draw_signals(figure: Any, _scene: Scene, solution: Recording) -> None:
 
 
 def no_lines(_truth: Truths) -> Iterator[tuple[str, str]]:
-    """Of a machine of which the simulator alone knows nothing worth a line."""
+    """No lines, for a machine without texts of its own."""
     yield from ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unseen:
-    """What misleads a model without a warning, unless its recipe draws it.
+    """An effect that misleads a model without a warning, unless its recipe varies it.
 
     Attributes
     ----------
     path : str
-        Of the value in the scene; a recipe that sets or draws it trains models that know it.
+        Path of the value in the scene; models trained on a recipe that sets or draws it know it.
     severity : str
-        Of the models that it misleads: what its name begins with.
+        Beginning of the severity names of the models that it misleads.
     text : str
-        What it does, and what a person can check instead.
+        The effect, and how to check for it.
     shown : str
-        Recipe of such machines: a model that was shown them refuses them.
+        Recipe of such machines: a model trained to refuse them does so.
     """
 
     path: str
@@ -83,20 +83,20 @@ class Unseen:
 
 @dataclass(frozen=True, kw_only=True)
 class Presentation:
-    """How a machine is shown, and what of it a model takes for granted.
+    """Presentation of a machine, and the assumptions that a model makes about it.
 
     Attributes
     ----------
     draw : callable
-        Figure, scene, solution -> the picture of a simulated run.
+        (figure, scene, solution): draws the picture of a simulated run.
     lines : callable
-        What the simulator knows of a run -> what it is about, and a line of text.
+        Truths of a run -> pairs of a subject and a line of text.
     sizes : tuple of str
-        What of a nameplate recipes leave as it is, as dotted paths of the scene.
+        Dotted paths of nameplate data that recipes do not vary.
     shifts : tuple of Shift
-        What may differ from one machine to the next.
+        Possible differences between machines.
     unseen : tuple of Unseen
-        Of that, what misleads without a warning.
+        Differences that mislead without a warning.
     """
 
     draw: Callable[[Any, Scene, Recording], None] = draw_signals

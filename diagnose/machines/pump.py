@@ -1,4 +1,4 @@
-"""How a reciprocating pump is shown, and what of it a model takes for granted."""
+"""Presentation of a reciprocating pump, and the assumptions that a model makes about it."""
 
 from collections.abc import Iterator
 from typing import Any, cast
@@ -12,11 +12,11 @@ from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.si_text import plain
 from ..pictures.panel import COLOURS
-from .presentation import Presentation, Truths, Unseen, density, label, told
+from .presentation import Presentation, Truths, Unseen, density, label, value_text
 from .shifts import factor, set_to
 
 _REVOLUTIONS = 2  # drawn
-_CELSIUS = 273.15  # K, of its zero
+_CELSIUS = 273.15  # K at 0 degrees Celsius
 
 
 def _draw_pump(figure: Any, scene: Scene, solution: Recording) -> None:
@@ -49,7 +49,7 @@ def _draw_pump(figure: Any, scene: Scene, solution: Recording) -> None:
 
 
 def _draw_rest(figure: Any, solution: Recording) -> None:
-    """A test of the casing at rest: forces and accelerations over time, and their spectra."""
+    """Draw a test of the casing at rest: forces and accelerations over time, and their spectra."""
     rate = solution.sample_rate
     time = np.arange(solution.signal.shape[1]) / rate
     panels = figure.subplots(2, 2, sharex="col")
@@ -72,7 +72,7 @@ def _draw_rest(figure: Any, solution: Recording) -> None:
 def _pressures(
     axes: Any, scene: PumpScene, solution: Recording, turns: NDArray[np.float64]
 ) -> None:
-    """Cylinder pressure of every throw, and what sensors make of it."""
+    """Draw the cylinder pressure of every throw, and the sensor signals."""
     area = np.pi / 4 * scene.piston.diameter**2
     for throw in range(len(scene.throws)):
         suffix = f"_{throw + 1}" if throw else ""
@@ -82,13 +82,13 @@ def _pressures(
             axes.plot(turns, force / area / 1e6, lw=0.8, color=colour, label=f"{throw + 1}")
     for channel, row in zip(solution.channels, solution.signal, strict=True):
         if channel.quantity == "pressure":
-            told = {"label": short_name(channel.name), "color": "black", "ls": ":"}
-            axes.plot(turns, row[: turns.size] / 1e6, lw=0.9, **told)
+            style = {"label": short_name(channel.name), "color": "black", "ls": ":"}
+            axes.plot(turns, row[: turns.size] / 1e6, lw=0.9, **style)
     label(axes, "crank revolutions", "gauge pressure [MPa]", "Cylinder pressure")
 
 
 def _orbit(axes: Any, scene: PumpScene, offset: NDArray[np.float64]) -> None:
-    """Path of the pin's centre in its clearance circle."""
+    """Draw the path of the pin's centre in its clearance circle."""
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181)) * scene.joint.crankpin.clearance_radial
     axes.plot(1e3 * circle.real, 1e3 * circle.imag, color="black", lw=1)
     axes.plot(1e3 * offset[:, 0], 1e3 * offset[:, 1], lw=0.5, color=COLOURS[0])
@@ -108,14 +108,15 @@ def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
     for name in pins:
         throw = name.removeprefix("pin_peak")
         number = (throw.removeprefix("_") or "1") if len(pins) > 1 else ""
-        force = f"peak {told(truth, name)} (mean over revolutions), "
-        force += f"rms {told(truth, f'pin_rms{throw}')}"
+        force = f"peak {value_text(truth, name)} (mean over revolutions), "
+        force += f"rms {value_text(truth, f'pin_rms{throw}')}"
         if f"wrist_peak{throw}" in truth:
-            force += f"; wrist pin {told(truth, f'wrist_peak{throw}')}"
-            force += f", guide {told(truth, f'guide_peak{throw}')} peak"
+            force += f"; wrist pin {value_text(truth, f'wrist_peak{throw}')}"
+            force += f", guide {value_text(truth, f'guide_peak{throw}')} peak"
         yield f"pin {number}".strip(), force
         if f"pressure_lowest{throw}" in truth:
-            low, high = (told(truth, f"pressure_{end}{throw}") for end in ("lowest", "highest"))
+            ends = (f"pressure_{end}{throw}" for end in ("lowest", "highest"))
+            low, high = (value_text(truth, end) for end in ends)
             ratio = truth.get(f"pressure_ratio{throw}")
             about = f", ratio {plain(ratio.value, 3)} absolute" if ratio else ""
             yield f"pressure {number}".strip(), f"{low} to {high} gauge{about}"
@@ -125,7 +126,7 @@ def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
         rub = f", rough peaks touch {100 * touching:.2g} % of the time" if touching else ""
         warm = truth.get("film_temperature_k")
         heat = f", the warmest at {warm.value - _CELSIUS:.3g} degrees Celsius" if warm else ""
-        yield "oil", f"least film of the pins {told(truth, 'min_film_m')}{heat}{rub}"
+        yield "oil", f"least film of the pins {value_text(truth, 'min_film_m')}{heat}{rub}"
     if contacts or not oiled:  # pins in oil never lose contact with it
         yield "contacts", f"{plain(contacts, 2)} in a revolution, dry joints with clearance"
 

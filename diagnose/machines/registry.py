@@ -1,4 +1,4 @@
-"""How the machine of a scene is shown."""
+"""Registry of presentations."""
 
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.pump import PumpScene
@@ -12,11 +12,11 @@ PRESENTATIONS: dict[type[Scene], Presentation] = {
     JournalScene: journal.PRESENTATION,
     ShaftScene: shaft.PRESENTATION,
 }
-"""Type of scene -> how its machine is shown; a machine without a row is shown plainly."""
+"""Type of scene -> presentation; a machine without a row uses the default."""
 
 
 def presentation_of(scene: Scene) -> Presentation:
-    """How the machine of a scene is shown.
+    """Presentation of the machine of a scene.
 
     Examples
     --------

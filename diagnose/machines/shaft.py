@@ -1,4 +1,4 @@
-"""How a propulsion shaft is shown, and what of it a model takes for granted."""
+"""Presentation of a propulsion shaft, and the assumptions that a model makes about it."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from ...sim.scene.shaft import ShaftScene
 from ..pages.page import short_name
 from ..pages.si_text import plain, si_text
 from ..pictures.panel import COLOURS
-from .presentation import Presentation, Truths, Unseen, density, label, told
+from .presentation import Presentation, Truths, Unseen, density, label, value_text
 from .shifts import add, factor, set_to
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _REVOLUTIONS = 2  # drawn
 
 
 def _draw_shaft(figure: Any, scene: Scene, solution: Recording) -> None:
-    """The line with what it carries, its journals in their bores, and what its sensors see."""
+    """Draw the line with its loads, the journals in their bores, and the sensor signals."""
     shaft = cast(ShaftScene, scene)
     from ...sim.shaft.at_rest import shaft_state  # kernels, which a nameplate needs none of
 
@@ -50,7 +50,7 @@ def _draw_shaft(figure: Any, scene: Scene, solution: Recording) -> None:
 
 
 def _shaft_line(axes: Any, scene: ShaftScene, state: "ShaftState") -> None:
-    """Heights of the shaft over the length, and the reaction of every bearing."""
+    """Draw the height of the shaft over the length, and the reaction of every bearing."""
     film = state.film
     height = 1e3 * film.deflection[0::4]
     axes.plot(state.beam.stations, height, lw=1, color=COLOURS[0])
@@ -73,7 +73,7 @@ def _shaft_line(axes: Any, scene: ShaftScene, state: "ShaftState") -> None:
 
 
 def _bores(axes: Any, state: "ShaftState", path: NDArray[Any]) -> None:
-    """Paths of the journals over their clearances, seen from aft; tells the colours for all."""
+    """Draw the journal paths over their clearances, seen from aft, with the legend of colours."""
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
     axes.plot(circle.real, circle.imag, color="black", lw=1)
     for i, bearing in enumerate(state.film.bearings):
@@ -92,9 +92,9 @@ def _bores(axes: Any, state: "ShaftState", path: NDArray[Any]) -> None:
 
 
 def _touching(bore: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Where the middle of a journal can be at the most, seen from aft: no gap is negative there.
+    """Limit of the positions of a journal's centre, seen from aft, at which it touches the bore.
 
-    Of the extra gap of a bore over its clearance, as of
+    `bore` is the extra gap over the clearance, as in
     :class:`wearstate.sim.film.solve.FilmGeometry`, whose angle counts from straight down.
     """
     angle = 2 * np.pi * np.arange(len(bore)) / len(bore)
@@ -111,22 +111,22 @@ def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
         for name in truth
         if name.startswith("reaction_") and name != "reaction_sum"
     ]
-    shown = ", ".join(f"{name} {told(truth, f'reaction_{name}')}" for name in bearings)
-    yield "reactions", f"{shown}; in all {told(truth, 'reaction_sum')}"
+    shown = ", ".join(f"{name} {value_text(truth, f'reaction_{name}')}" for name in bearings)
+    yield "reactions", f"{shown}; in all {value_text(truth, 'reaction_sum')}"
     places = []
     for name in bearings:
         up, side = truth[f"up_{name}"].value, truth[f"side_{name}"].value
         angle = math.degrees(math.atan2(side, -up))
         places.append(f"{name} {si_text(math.hypot(up, side), 'm')} at {plain(angle)} deg")
     yield "journals", f"{', '.join(places)} from straight down"
-    yield "film", f"thinnest {told(truth, 'film_least')}"
+    yield "film", f"thinnest {value_text(truth, 'film_least')}"
 
 
 _DEGREE = math.radians(1.0)
 
 _SHIFTS = (
-    add("probes.*.offset", -6e-5, 6e-5, "the gap at rest in the middle is not known"),
-    add("probes.*.angle", -5 * _DEGREE, 5 * _DEGREE, "probes beside their place"),
+    add("probes.*.offset", -6e-5, 6e-5, "the gap of a centred shaft is unknown"),
+    add("probes.*.angle", -5 * _DEGREE, 5 * _DEGREE, "probes off their nominal position"),
     factor("probes.*.gain", 0.9, 1.1, "another steel under the probe"),
     factor("oil.viscosity_40", 0.68, 1.5, "one ISO grade down or up"),
     add("oil.temperature", -10.0, 10.0, "cold water, or the tropics"),
@@ -162,7 +162,7 @@ _SHIFTS = (
     factor("coupling.torque", 0.7, 1.3, "load of the engine"),
     set_to("coupling.angle", ("0.0005 rad",), "faces not parallel"),
     factor("shaft.young", 0.97, 1.03, "another steel"),
-    set_to("film.condition", ("guembel", "periodic"), "where the film ends"),
+    set_to("film.condition", ("guembel", "periodic"), "rupture of the film"),
 )
 
 

@@ -1,9 +1,9 @@
-"""What a recipe may take for granted: plausible shifts of every machine's scene, with reasons.
+"""Plausible differences between machines that a recipe may not vary, with reasons.
 
-A row whose path a scene lacks is left out, unless it adds the part; one that the recipe draws is
-shifted beyond its range instead, see :mod:`.blindspots.rows`. All amounts are estimates of what
-differs from one machine, or one nameplate, to the next. The rows of each machine are beside how it
-is shown; a new row is one line.
+A row whose path a scene lacks is left out, unless it adds the part; a value that the recipe draws
+is moved beyond its range instead, see :mod:`.blindspots.rows`. All amounts are estimates of the
+differences between machines or nameplates. The rows of each machine are in its presentation; a new
+row is one line.
 """
 
 from collections.abc import Mapping
@@ -15,24 +15,24 @@ Kind = Literal["factor", "add", "set"]
 
 @dataclass(frozen=True, kw_only=True)
 class Shift:
-    """A value of the scene, and what it may be instead.
+    """A value of the scene, and its possible alternatives.
 
     Attributes
     ----------
     path : str
-        Dotted path of the scene; ``*`` stands for every list entry, all shifted together.
+        Dotted path of the scene; ``*`` stands for every list entry, all changed together.
     kind : {"factor", "add", "set"}
         Whether the amounts multiply the machine's own value, are added to it [SI], or replace it.
     amounts : tuple
         One row each; text has a unit or is the name of a rung or law.
     why : str
-        How such a difference comes about.
+        Cause of such a difference.
     beside : mapping
-        What has to be set with it, by dotted path.
+        Values to be set with it, by dotted path.
     under : mapping
-        What the scene must say for the value to count, by dotted path: a rung that reads it.
+        Values of the scene required for an effect, by dotted path: a rung that uses it.
     adds : bool
-        Whether the row holds for scenes that lack the part too: `beside` describes all of it.
+        Whether the row also applies to scenes without the part, which `beside` describes fully.
     """
 
     path: str
@@ -45,12 +45,12 @@ class Shift:
 
 
 def factor(path: str, low: float, high: float, why: str) -> Shift:
-    """A value times one of two factors."""
+    """Shift that multiplies a value by one of two factors."""
     return Shift(path=path, kind="factor", amounts=(low, high), why=why)
 
 
 def add(path: str, low: float, high: float, why: str) -> Shift:
-    """A value with one of two amounts added [SI]."""
+    """Shift that adds one of two amounts to a value [SI]."""
     return Shift(path=path, kind="add", amounts=(low, high), why=why)
 
 
@@ -63,6 +63,6 @@ def set_to(
     under: Mapping[str, Any] | None = None,
     adds: bool = False,
 ) -> Shift:
-    """A value replaced; of a part that a scene may lack, `adds` makes it with what is `beside`."""
-    with_it: dict[str, Mapping[str, Any]] = {"beside": beside or {}, "under": under or {}}
-    return Shift(path=path, kind="set", amounts=amounts, why=why, adds=adds, **with_it)
+    """Shift that replaces a value; `adds` creates a missing part from `beside`."""
+    context: dict[str, Mapping[str, Any]] = {"beside": beside or {}, "under": under or {}}
+    return Shift(path=path, kind="set", amounts=amounts, why=why, adds=adds, **context)
