@@ -28,8 +28,8 @@ def merged_faults(faults: Sequence[str]) -> list[str]:
 
     Examples
     --------
-    >>> merged_faults(["machine.0 (a.b): a.c is missing", "machine.1 (a.d): a.c is missing", "else"])
-    ['machine.0 (a.b), machine.1: a.c is missing', 'else']
+    >>> merged_faults(["machine.0 (a.b): a.c is missing", "machine.1 (a.d): a.c is missing", "b"])
+    ['machine.0 (a.b), machine.1: a.c is missing', 'b']
     """
     places: dict[str, list[str]] = {}
     for text in dict.fromkeys(faults):
