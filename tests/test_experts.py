@@ -132,7 +132,7 @@ def expert(small_trained):
     """The trained model with its blend twice, weighted by two made-up regimes."""
     model, table, _ = small_trained
     inputs, truth = table.values, table.manifest[model.card.severity].to_numpy(dtype=float)
-    line = CANDIDATES[0].fit(inputs, inputs, 1.0 + (truth > np.median(truth)), 0)
+    line = CANDIDATES[0].fit(inputs, inputs, 1.0 + (truth > np.median(truth)), 0, 0)
     sign = Blend(names=("ridge 3",), parts=(line,), weights=np.ones(1), low=0.5, high=4.0)
     heads = tuple(
         Head(
@@ -140,7 +140,7 @@ def expert(small_trained):
         )
         for name, slope in (("dry", -5.0), ("flooded", 5.0))
     )
-    other = CANDIDATES[1].fit(inputs, inputs, truth, 0)
+    other = CANDIDATES[1].fit(inputs, inputs, truth, 0, 0)
     flat = Blend(names=("ridge 30",), parts=(other,), weights=np.ones(1), low=1e-5, high=1e-3)
     own = model.blind.severity
     experts = Experts(gates=heads, blends=(own, flat), first=0, features=len(model.names), tube=0.1)

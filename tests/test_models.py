@@ -369,7 +369,7 @@ def both(trained):
     blend = Blend(
         names=("ridge 30", "trees"),
         parts=tuple(
-            rows[n].fit(table.values, table.values, severity, 0) for n in ("ridge 30", "trees")
+            rows[n].fit(table.values, table.values, severity, 0, 0) for n in ("ridge 30", "trees")
         ),
         weights=np.array([0.25, 0.75]),
         low=1e-5,
