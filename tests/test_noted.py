@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from wearstate.diagnose.feature_rows.model_card import TrainedCondition
 from wearstate.diagnose.feature_rows.noted import NOTED, doubted, given_of, noted_values, strayed
+from wearstate.diagnose.learning.experts import FEWEST_RECORDS
 from wearstate.diagnose.wear_model.bundle import ModelError, load_bundle
 from wearstate.diagnose.wear_model.file import load_model, save_model
-from wearstate.diagnose.wear_model.learn import learn
+from wearstate.diagnose.wear_model.learn import _worth_asking, learn
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
 
 NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
@@ -118,6 +119,23 @@ def test_a_model_uses_a_thermometer_and_does_without():
         ]
     )
     assert abs(np.log(off).mean(axis=1)).max() < 0.05  # neither is biased by the warming
+
+
+def test_conditions_that_help_one_regime_are_worth_asking_for():
+    """A fifth less of the small errors of dry pins, next to nothing of all records' mean."""
+    dry = np.arange(400) < 200
+    rows = replace(
+        training(("viscosity_pa_s",), effect=0.0),
+        severity=np.full(400, 1e-4),
+        faults={"lubrication_dry": dry, "lubrication_flooded": ~dry},
+    )
+    blind = rows.severity + np.where(dry, 5e-6, 1e-4)
+    better = rows.severity + np.where(dry, 4e-6, 1e-4)
+    assert _worth_asking(rows, better, blind)
+    assert not _worth_asking(replace(rows, faults={}), better, blind)
+    assert not _worth_asking(rows, blind, blind)
+    few = {"lubrication_dry": np.arange(400) < FEWEST_RECORDS - 1}
+    assert not _worth_asking(replace(rows, faults=few), better, blind)
 
 
 @pytest.fixture(scope="module")
