@@ -412,7 +412,7 @@ class Stopped:
 @pytest.mark.parametrize("search", [run_away, lambda *_, **__: Stopped()])
 def test_a_fit_that_does_not_settle_says_so(monkeypatch, search):
     monkeypatch.setattr(modal, "least_squares", search)
-    with pytest.raises(ValueError, match="fit of 1 modes must settle"):
+    with pytest.raises(ValueError, match="fit of 1 modes must converge"):
         modal.fit_modes(F, NARROW, [90.0], [0.01])
 
 

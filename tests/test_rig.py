@@ -424,7 +424,7 @@ def test_words_of_a_test(ship):
     ("arguments", "message"),
     [
         (["--push", "stern_aft"], "need --test"),
-        (["--test", "hammer", "--no-calibrate"], "needs --calibrate"),
+        (["--test", "hammer", "--no-calibrate"], "leave out --no-calibrate"),
         (
             ["--test", "hammer", "--push", "gear"],
             "push = 'gear' is no bearing; choose one of stern",
