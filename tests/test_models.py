@@ -642,7 +642,7 @@ def test_a_model_that_has_learnt_nothing_says_so(trained):
     told = dataclasses.replace(model, blind=blind).notice
     assert told.startswith("trained on simulation; no measured joint")
     assert "one guess for all errs by" in told
-    assert "tells hardly anything about the wear" in told
+    assert "says hardly anything about the wear" in told
 
 
 def test_holding_out_too_much_is_refused_before_any_work(small_set, monkeypatch):

@@ -153,7 +153,7 @@ class Blend:
         return dict(zip(self.names, self.weights.tolist(), strict=True))
 
     def shares(self, rows: Float) -> Float:
-        """Of no regimes [shape=(n, 0)]: one blend is for all."""
+        """Shares of regimes [shape=(n, 0)]: a single blend has none."""
         return np.empty((len(rows), 0))
 
     @property

@@ -21,7 +21,7 @@ COVERAGE = 0.9
 """Nominal coverage of interval and set."""
 
 _LEAST_APART = 1e-2  # disagreement below which parts agree
-_LEAST_SCALE = 1e-6  # relative error below which errors are no more told apart
+_LEAST_SCALE = 1e-6  # relative error below which errors are not distinguished
 _OUTER = 0.1  # share of the records at either end of a value
 _FEWEST_MACHINES = 20  # of a part: of fewer, one more or less decides
 _PENALTY = 1.0  # of the scale's slopes, for standardised inputs: a few records decide nothing
@@ -62,16 +62,16 @@ def scale_inputs(
     disagreement: ArrayLike,
     shares: Float | None = None,
 ) -> Float:
-    """What the expected size of an error is told from.
+    """Inputs from which the expected size of an error is predicted.
 
     Parameters
     ----------
     estimate : array_like [shape=(n,)]
-        Of the severity [m], > 0.
+        Estimate of the severity [m], > 0.
     distance : array_like [shape=(n,)]
         From the cloud of familiar recordings [-].
     disagreement : array_like [shape=(n,)]
-        Of the parts of the blend, as a logarithm.
+        Disagreement of the parts of the blend, as a logarithm.
     shares : numpy.ndarray [shape=(n, n_regimes)], optional
         Probability of each regime: in some of them wear shows less. No regimes by default.
 
@@ -97,7 +97,7 @@ def fit_scale(inputs: Float, log_error: Float) -> Scale:
     Parameters
     ----------
     inputs : numpy.ndarray [shape=(n, n_inputs)]
-        Of :func:`scale_inputs`.
+        Result of :func:`scale_inputs`.
     log_error : numpy.ndarray [shape=(n,)]
         Log truth minus log estimate, of records that the model had no part in.
 
@@ -169,7 +169,7 @@ class IntervalCalibration:
 
 
 def record_weights(group: NDArray[np.intp]) -> Float:
-    """Weights of records of which each machine has the same share, beside one unseen machine.
+    """Weights of records such that each machine and one unseen machine have the same share.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def widening(calibration: IntervalCalibration, parts: Sequence[NDArray[np.bool_]
     ----------
     calibration : IntervalCalibration
     parts : sequence of numpy.ndarray [shape=(n,)]
-        Records of each part, as of :func:`outer_tenths`. Parts of fewer than 20 machines tell
+        Records of each part, from :func:`outer_tenths`. Parts of fewer than 20 machines say
         nothing.
 
     Returns
@@ -419,7 +419,7 @@ def grade_limits(
     edges : array_like
         Where grades 1, 2, … begin [m].
     coverage : float
-        Of every grade by itself.
+        Coverage of every grade by itself.
 
     Returns
     -------
@@ -456,7 +456,7 @@ def grade_set(estimate: float, scale: float, limits: Float, edges: ArrayLike) ->
     estimate, scale
         As of :func:`interval`.
     limits : numpy.ndarray [shape=(n_grades,)]
-        Of :func:`grade_limits`.
+        Result of :func:`grade_limits`.
     edges : array_like
         Where grades 1, 2, … begin [m].
 

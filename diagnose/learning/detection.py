@@ -1,4 +1,4 @@
-"""From which wear on estimates can be told from those of as-new machines."""
+"""Least wear whose estimates differ from those of as-new machines."""
 
 import math
 
@@ -17,7 +17,7 @@ _FEWEST = 20  # as-new machines: for a share of 5 % one of them
 
 
 def visible_from(severity: Float, estimate: Float, as_new: float) -> float | None:
-    """Least wear that nine of ten estimates tell from as new, at 5 % false alarms.
+    """Least wear that nine of ten estimates distinguish from as new, at 5 % false alarms.
 
     Parameters
     ----------
@@ -36,7 +36,8 @@ def visible_from(severity: Float, estimate: Float, as_new: float) -> float | Non
     -----
     The logarithm of the estimate is taken as a straight line over that of the severity, with equal
     normal scatter; it crosses the threshold with the probability asked where
-    ``b0 + b1 ln(a) - z s = ln(threshold)``. An estimate that does not rise tells nothing.
+    ``b0 + b1 ln(a) - z s = ln(threshold)``. If the estimate does not rise with the wear, there is
+    none.
 
     References
     ----------

@@ -17,17 +17,17 @@ from .regressions import USUAL, Fitted, Index, RegressionOption, cheapest_good, 
 Float = NDArray[np.float64]
 
 FEWEST_RECORDS = 100
-"""Of each regime, for a blend of its own."""
+"""Least number of records of each regime, for a blend of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Experts:
-    """A blend for every regime, and what tells the regimes.
+    """A blend for every regime, and the classifiers that recognise the regimes.
 
     Attributes
     ----------
     gates : tuple of Head
-        Each tells one regime from the features.
+        Each gives the probability of one regime from the features.
     blends : tuple of Blend
         Inputs to target, in the order of the gates.
     first : int
@@ -82,7 +82,7 @@ class Experts:
 
 
 def regime_shares(probabilities: Sequence[Float]) -> Float:
-    """Probabilities of regimes told one by one [each shape=(n,)], as shares of 1.
+    """Normalise the probabilities of regimes [each shape=(n,)] to a sum of 1.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def fit_experts(
     Parameters
     ----------
     gates : sequence of FittedHead
-        What tells each regime.
+        Classifier of each regime.
     present : sequence of numpy.ndarray [each shape=(n,)]
         Whether each record is of the regime.
     target : numpy.ndarray [shape=(n,)]

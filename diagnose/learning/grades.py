@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 GRADE_NAMES = ("as new", "worn", "plan renewal", "condemned")
 
 GRADE_COLOURS = ("#3a923a", "#c8b400", "#e07b00", "#c03a2b")
-"""Of grades 0 to 3; the name stands beside the colour wherever it is used."""
+"""Names of grades 0 to 3, shown with the colour wherever it is used."""
 
 NO_GRADE_COLOUR = "#5b6470"
 

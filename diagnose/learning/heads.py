@@ -1,4 +1,4 @@
-"""Whether a fault beside the wear is there, or a regime in which wear sounds different."""
+"""Classifiers of faults other than the wear, and of regimes that change the sound of wear."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _LOGISTIC_C = 10.0  # weak: one slope on hundreds of records
 
 @dataclass(frozen=True, kw_only=True)
 class Head:
-    """Tells the presence of one fault beside the wear.
+    """Classifier of one fault other than the wear, or of one regime.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class FittedHead:
     members : dict of str to float
         Weight of each part of its blend.
     probability, shifted : numpy.ndarray [shape=(n,)]
-        Of every record, and of the same on other machines.
+        Probability of every record, and of the same record on other machines.
     """
 
     head: Head
@@ -85,7 +85,7 @@ def told_apart(fitted: FittedHead, here: NDArray[np.bool_], share: float) -> Hea
     here : numpy.ndarray [shape=(n,)]
         Whether each record has it.
     share : float
-        Of the records without.
+        Share of the records without it.
 
     Returns
     -------

@@ -35,7 +35,7 @@ def mutual_information(
         Which neighbour's distance is the scale of the estimate; of a condition with fewer records,
         its farthest.
     seed : int
-        Of the noise that parts equal values, 1e-10 of their size.
+        Seed of the noise that separates equal values, 1e-10 of their size.
 
     Returns
     -------
@@ -99,8 +99,9 @@ def _with_conditions(x: Float, labels: NDArray[np.generic], neighbours: int) -> 
     for each in np.unique(condition):
         own = condition == each
         distance[own] = _to_neighbour(x[own], min(neighbours, counts[each] - 1))
-    told = digamma(np.minimum(neighbours, size - 1)) - digamma(size) - digamma(_closer(x, distance))
-    return max(0.0, float(digamma(x.size)) + float(np.mean(told)))
+    local = digamma(np.minimum(neighbours, size - 1)) - digamma(size)
+    local = local - digamma(_closer(x, distance))
+    return max(0.0, float(digamma(x.size)) + float(np.mean(local)))
 
 
 def _to_neighbour(x: Float, nth: int) -> Float:

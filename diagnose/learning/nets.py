@@ -84,7 +84,7 @@ def fit_nets(rows: Float, moved: Float, target: Float, seed: int, noted: int) ->
     target : numpy.ndarray [shape=(n,)]
         > 0.
     seed : int
-        Of the weights that a net starts from, and of the order of its records.
+        Seed of the initial weights and of the order of the records.
     noted : int
         Number of columns at the end that are noted conditions. Each is an input by itself: the
         principal directions of a thousand features hold next to nothing of a single column.

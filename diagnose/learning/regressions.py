@@ -61,7 +61,7 @@ def _ridge(penalty: float, *, log: bool) -> Fit:
 def _share(tried: int, rows: Float) -> float:
     """Share of the features that a node may choose from: as many, however many there are.
 
-    A fixed share starves the trees of a short row, in which few features tell of the wear.
+    A fixed share starves the trees of a short row, in which few features depend on the wear.
     """
     return min(1.0, tried / int(rows.shape[1]))
 
@@ -167,7 +167,7 @@ class RegressionCandidate:
     ----------
     name : str
     cost_ms : float
-        Of one prediction [ms].
+        Time of one prediction [ms].
     fit : callable
         ``fit(rows, moved, target, seed, noted)`` gives the part; `moved` are the same records on
         other machines, the target is > 0, the last `noted` columns are noted conditions.
@@ -207,7 +207,7 @@ WITNESSES = tuple(candidate.name for candidate in CANDIDATES[:_LINES])
 """Names of the straight lines of the logarithm."""
 
 BUDGET_MS = 5.0
-"""Time that a prediction may take unless told otherwise [ms]."""
+"""Time that a prediction may take by default [ms]."""
 
 
 # --- the choice
@@ -223,7 +223,7 @@ class RegressionOption:
     members : tuple of int
         Places in the list of candidates.
     cost_ms : float
-        Of one prediction [ms].
+        Time of one prediction [ms].
     error : float
         Mean absolute error on groups that had no part in the fit [unit of the target].
     on_front : bool
@@ -251,7 +251,8 @@ class Fitted(Generic[Kind]):
     estimate : numpy.ndarray [shape=(n,)]
         Estimates of every record by parts, weights and choice that its group had no part in.
     disagreement : numpy.ndarray [shape=(n,)]
-        Of the blend's parts, on groups they had no part in; see :meth:`Blend.disagreement`.
+        Disagreement of the blend's parts, fitted without the group; see
+        :meth:`Blend.disagreement`.
     shifted_estimate, shifted_disagreement : numpy.ndarray [shape=(n,)]
         The same of the records on other machines, by the weights of the blend.
     shares, shifted_shares : numpy.ndarray [shape=(n, n_regimes)]
@@ -274,7 +275,7 @@ class Fitted(Generic[Kind]):
 
     @property
     def cost_ms(self) -> float:
-        """Of one prediction [ms]."""
+        """Time of one prediction [ms]."""
         return next(option.cost_ms for option in self.options if option.name == self.chosen)
 
     def knowing(self, options: tuple[RegressionOption, ...]) -> "Fitted[Kind]":
@@ -304,7 +305,7 @@ def fit_blend(
     folds : sequence of (numpy.ndarray, numpy.ndarray)
         Records to fit on and to judge on; no group is on both sides.
     seed : int
-        Of the trees.
+        Seed of trees and networks.
     budget_ms : float, optional
         Time that one prediction may take [ms]; :data:`BUDGET_MS` unless given.
     candidates : sequence of RegressionCandidate
@@ -381,8 +382,8 @@ def fit_line(
     Returns
     -------
     Linear
-        Of the logarithm of the target, and without bounds to its features: a witness that points
-        beyond what was trained, which an estimate may not.
+        Line of the logarithm of the target without bounds to its features: unlike an estimate, this
+        witness may point beyond the trained range.
     """
     lines = {each.name: each for each in CANDIDATES if each.name in WITNESSES}
     best = min((o for o in options if o.name in lines), key=lambda option: option.error)
@@ -522,7 +523,7 @@ def _options(
 
 
 def cheapest_good(options: Sequence[RegressionOption], limit: float) -> RegressionOption:
-    """Of those within a limit of time [ms] the cheapest near the least error, then the better."""
+    """Cheapest option within a limit of time [ms] whose error is near the least one."""
     within = [option for option in options if option.cost_ms <= limit]
     least = min(option.error for option in within)
     close = [option for option in within if option.error <= (1 + _TIE) * least]

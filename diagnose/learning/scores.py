@@ -14,13 +14,13 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 RESAMPLES = 1000
-"""Of whole machines, for every interval."""
+"""Number of resamplings of whole machines, for every interval."""
 
 LEVEL = 0.95
-"""Of every interval over machines."""
+"""Nominal coverage of every interval over machines."""
 
 FAR_SHARE = 0.08
-"""Of the condemning limit; farther than this from an edge, a grade ought to be right."""
+"""Share of the condemning limit; farther than this from an edge, a grade ought to be right."""
 
 FALSE_ALARM_GRADE = 2
 """A machine of grade 0 that is called this or more is a false alarm."""
@@ -36,7 +36,7 @@ class ScoreFigure:
     Attributes
     ----------
     value, low, high : float
-        NaN where no record tells.
+        NaN if no record determines it.
     """
 
     value: float
@@ -80,7 +80,7 @@ def resampled(groups: ArrayLike, *, n: int = RESAMPLES, seed: int = 0) -> Resamp
     n : int
         Number of resamples.
     seed : int
-        Of the draws.
+        Seed of the resampling.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def share(top: ArrayLike, bottom: ArrayLike, draws: Resamples) -> ScoreFigure:
     top, bottom : array_like [shape=(n_records,)]
         For a mean over some records: the value there and 1, elsewhere both 0.
     draws : Resamples
-        Of the same records.
+        Machine of each record.
 
     Returns
     -------
@@ -132,8 +132,8 @@ def share(top: ArrayLike, bottom: ArrayLike, draws: Resamples) -> ScoreFigure:
 
 
 def _figure(value: float, top: Float, bottom: Float) -> ScoreFigure:
-    told = bottom > 0
-    return _between(value, top[told] / bottom[told])
+    defined = bottom > 0
+    return _between(value, top[defined] / bottom[defined])
 
 
 def _between(value: float, found: Float) -> ScoreFigure:
@@ -238,12 +238,12 @@ def figures(
     limit : float
         Condemning limit [m].
     draws : Resamples
-        Of the same records.
+        Machine of each record.
 
     Returns
     -------
     dict
-        NaN where no record tells (no set is given, no machine is condemned).
+        NaN if no record determines it (no set is given, no machine is condemned).
 
     Notes
     -----
@@ -253,8 +253,8 @@ def figures(
     Examples
     --------
     >>> wear = np.array([1e-4, 3e-4])
-    >>> told = point_judged(np.arange(2), wear, wear + 1e-5, np.array([0, 1]), 2)
-    >>> found = figures(told, [2e-4], 2e-4, resampled([0, 1]))
+    >>> records = point_judged(np.arange(2), wear, wear + 1e-5, np.array([0, 1]), 2)
+    >>> found = figures(records, [2e-4], 2e-4, resampled([0, 1]))
     >>> round(found["mae_share_of_limit"].value, 3), found["kappa"].value
     (0.05, 1.0)
     """
@@ -346,8 +346,8 @@ def _kappas(counts: Float, n: int) -> Float:
     weight = (np.arange(n)[:, None] - np.arange(n)) ** 2
     by_chance = np.einsum("rij,rkl,il->r", table, table, weight)
     seen = (table * weight).sum(axis=(1, 2)) * table.sum(axis=(1, 2))
-    told = (table.sum(axis=2) > 0).sum(axis=1) > 1
-    share_seen = np.divide(seen, by_chance, out=np.full(len(seen), np.nan), where=told)
+    defined = (table.sum(axis=2) > 0).sum(axis=1) > 1
+    share_seen = np.divide(seen, by_chance, out=np.full(len(seen), np.nan), where=defined)
     return np.asarray(1 - share_seen)
 
 
@@ -378,7 +378,7 @@ def smallest_found(
     healthy : numpy.ndarray [shape=(n_records,)]
         Records that must raise no alarm; at least one.
     draws : Resamples
-        Of the same records.
+        Machine of each record.
     false_alarm : float
         Share of healthy records above the threshold, 0 < share < 1.
     detection : float

@@ -87,7 +87,7 @@ class Estimator:
         distance : float
             Its novelty.
         edges : sequence of float
-            Of the grades [m].
+            Edges of the grades [m].
         cautious : bool
             There is a caution: the interval is then that of machines unlike the trained ones.
 

@@ -108,7 +108,7 @@ def part_of(arrays: Mapping[str, NDArray[Any]], part: str, kind: Any) -> dict[st
     Parameters
     ----------
     arrays : mapping
-        Of the file.
+        Name of the file, for messages.
     part : str
         Its dotted name.
     kind : type

@@ -202,9 +202,9 @@ def checked(kind: type[Table], table: Mapping[str, Any], path: str | Path, name:
         What it must hold.
     table : mapping
     path : str or Path
-        Of the file, for the message.
+        Name of the file, for messages.
     name : str
-        Of the table in it.
+        Name of the table in it.
 
     Raises
     ------
@@ -344,7 +344,7 @@ def _table(members: Mapping[str, bytes], name: str, path: str | Path) -> dict[st
 def _check_seal(
     seal: Mapping[str, Any], members: Mapping[str, bytes], path: str | Path, kind: str
 ) -> None:
-    """Of this version and kind, and each member as it was written."""
+    """Check version, kind and the checksum of each member."""
     for name, wanted in (("schema_version", BUNDLE_SCHEMA), ("features", feature_version())):
         if seal.get(name) != wanted:
             raise _other_version(path, name, seal.get(name), wanted)
@@ -352,8 +352,8 @@ def _check_seal(
         raise ModelError(
             f"{path} is a {str(seal.get('kind'))[:40]}, must be a {kind}; name one, or retrain it"
         )
-    told = seal.get("sha256")
-    wanted_sums = told if isinstance(told, dict) else {}
+    stated = seal.get("sha256")
+    wanted_sums = stated if isinstance(stated, dict) else {}
     found = {n: hashlib.sha256(d).hexdigest() for n, d in members.items() if n != _SEAL}
     if found != wanted_sums:
         changed = sorted(n for n in {*found, *wanted_sums} if found.get(n) != wanted_sums.get(n))

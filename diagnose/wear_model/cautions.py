@@ -127,7 +127,7 @@ def range_cautions(card: ModelCard, asked: Estimator, inputs: Float) -> list[str
 
 
 def condition_cautions(card: ModelCard, row: Float, recorded: Mapping[str, Any]) -> list[str]:
-    """Conditions outside the trained range: from the signal, or as noted beside it."""
+    """Conditions outside the trained range, from the signal or as noted with it."""
     cautions = []
     for condition in card.conditions:
         name, feature = condition.name, condition.feature

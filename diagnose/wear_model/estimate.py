@@ -63,7 +63,7 @@ SIMULATION_NOTICE = "trained on simulation; no measured joint of known clearance
 
 UNFAMILIAR_SHARE = 0.01
 """Share of familiar recordings that may be called unfamiliar, where the calibration is large
-enough to tell so small a share; else one in its number."""
+enough to determine so small a share; else one in its number."""
 
 _MOST_ODD = 2  # kinds of oddity: of 2,000 unseen pumps seven had two and none had three
 _KNOCKING_DB = 15.0  # simulated pumps of one throw swing by 33 dB in a turn, of three by 8
@@ -79,14 +79,14 @@ class WearModel:
     blind : Estimator
         Features to severity.
     informed : Estimator or None
-        Features and the conditions noted beside the recording to severity: used where all of them
-        are known. None where the conditions tell no more than the features do.
+        Severity from features and the conditions noted with the recording: used if all of these are
+        known. None if the conditions add nothing to the features.
     familiarity : Familiarity
         The cloud of the training recordings.
     levels : Levels
         Level to expect of each channel.
     heads : tuple of Head
-        Faults beside the wear.
+        Classifiers of faults other than the wear.
     strangers : tuple of Head
         Kinds of recordings that it was shown to refuse.
     card : ModelCard
@@ -126,7 +126,7 @@ class WearModel:
         error, guess = self.blind.error, self.blind.guess_error
         unskilled = (
             f"found on machines left out of training to err by {1e3 * error:.3g} mm, where one "
-            f"guess for all errs by {1e3 * guess:.3g} mm: it tells hardly anything about the wear"
+            f"guess for all errs by {1e3 * guess:.3g} mm: it says hardly anything about the wear"
         )
         return "; ".join(filter(None, (simulated, unskilled * (error > _UNSKILLED * guess))))
 
@@ -189,7 +189,7 @@ class WearModel:
         baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
             Healthy rows of the same machines, of a referenced model.
         conditions : sequence of mapping, optional
-            What was noted beside each recording, by the names of the card.
+            Conditions noted with each recording, by the names of the card.
 
         Returns
         -------
@@ -221,7 +221,7 @@ class WearModel:
     def _asked(
         self, row: Float, baseline: Float | None, conditions: Mapping[str, Any]
     ) -> tuple[Estimator, Float]:
-        """Who is to tell the severity of a recording, and from which inputs [shape=(1, n)]."""
+        """Estimator for the severity of a recording, and its inputs [shape=(1, n)]."""
         inputs = self._inputs(row[None, :], baseline)
         if self.informed is None or not self.informed_of(conditions):
             return self.blind, inputs
@@ -269,9 +269,9 @@ class WearModel:
             tells the evidence against them.
         conditions : mapping, optional
             What is known of the day by the names of the card [SI units]; unless given, what was
-            noted beside the recording.
+            noted with the recording.
         told : tuple of str
-            Cautions from what is known beside the signals.
+            Cautions from other knowledge than the signals.
         fs : float, optional
             Sample rate of an array or a table [Hz].
 
@@ -499,11 +499,11 @@ class WearModel:
         missing = [name for name, value in zip(self.noted, noted, strict=True) if np.isnan(value)]
         settings = " ".join(f"--set {NOTED[name].setting}" for name in missing)
         limit = self.card.condemning_limit_m
-        without, told = (100 * each.error / limit for each in (self.blind, self.informed))
+        without, known = (100 * each.error / limit for each in (self.blind, self.informed))
         return [
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not known: with "
             f"{'it' if len(missing) == 1 else 'them'} estimates of unseen machines erred by "
-            f"{told:.2g} % of the limit, without by {without:.2g} %; give {settings}"
+            f"{known:.2g} % of the limit, without by {without:.2g} %; give {settings}"
         ]
 
     def _findings(self, row: Float) -> tuple[FaultFinding, ...]:

@@ -124,7 +124,7 @@ class _HeadStructure(Strict):
 
 
 class _ExpertsStructure(Strict):
-    """Blends of an estimate by regimes, and the heads that tell these."""
+    """Blends of an estimate by regimes, and the classifiers of these."""
 
     gates: list[str] = Field(min_length=2, max_length=100)
     blends: list[BlendStructure] = Field(min_length=2, max_length=100)

@@ -61,13 +61,13 @@ class Learnt:
     blind : Estimator
         The same, with its uncertainty.
     informed : Estimator or None
-        By the features and the noted conditions; None where these tell no more.
+        By the features and the noted conditions; None if these add nothing.
     familiarity : Familiarity
     levels : Levels
     heads : tuple of (Head, dict)
         With their error rates, for the card.
     strangers : tuple of (Head, StrangerRates)
-        What tells the recordings to refuse.
+        Classifiers of the recordings to refuse.
     """
 
     severity: SeverityFit
@@ -94,17 +94,17 @@ def learn(
     ----------
     training : TrainingRows
     seed : int
-        Of the folds and the trees.
+        Seed of the folds and the trees.
     budget_ms : float, optional
-        Of :func:`wearstate.diagnose.learning.regressions.fit_blend`.
+        As for :func:`wearstate.diagnose.learning.regressions.fit_blend`.
     selection : Selection, optional
         How the features were chosen: the estimates of a fold are then those of the set that its
         training records ask for, so that the calibration knows what the choice costs.
     among : sequence of TrainingRows
         The sets that it was chosen from.
     as_new : float, optional
-        Severity up to which a machine counts as new [m], to tell from which wear on each regime
-        shows it.
+        Severity up to which a machine counts as new [m], to determine from which wear on each
+        regime shows it.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def learn(
     ------
     DataError
         A severity is not positive, no model is within the budget, or what is to be refused is
-        not told from the rest.
+        not distinguished from the rest.
     """
     refuse_no_wear(training.severity)
     strangers = fit_strangers(training, seed)
@@ -150,9 +150,9 @@ def learn(
 def _heads(
     training: TrainingRows, other: TrainingRows, folds: Folds, seed: int
 ) -> list[FittedHead]:
-    """What tells each fault and regime that enough records have, and enough have not.
+    """Fit a classifier of each fault and regime that enough records have, and enough lack.
 
-    A line tells a regime from hundreds of features as well as trees do: 96 % of 2,000 pumps.
+    A line recognises a regime from hundreds of features as well as trees do: 96 % of 2,000 pumps.
     """
     lines = [each for each in CANDIDATES if each.name in WITNESSES]
     return [
@@ -208,7 +208,7 @@ def _severity(
 
 
 def _gates(training: TrainingRows, heads: Sequence[FittedHead]) -> list[FittedHead]:
-    """Heads that tell the regimes, where each has records enough; else none."""
+    """Classifiers of the regimes if each has enough records; else none."""
     gates = [one for one in heads if is_regime(one.head.name)]
     records = [int(here.sum()) for name, here in training.faults.items() if is_regime(name)]
     return gates if records and min(records) >= FEWEST_RECORDS else []
@@ -346,7 +346,7 @@ def _out_of_fold_distances(
 def _rates(
     one: FittedHead, training: TrainingRows, estimate: Float, as_new: float | None
 ) -> dict[str, Any]:
-    """How often a head is right, and how the severity is told with and without what it finds."""
+    """Error rates of a classifier, and severity errors with and without what it finds."""
     name, found = one.head.name, one.probability > PRESENT
     here = training.faults[name]
     error = np.abs(estimate - training.severity)

@@ -1,4 +1,4 @@
-"""Recordings that a model must refuse: read from their files, and told from the familiar ones.
+"""Recordings that a model must refuse: read from their files, and distinguished from familiar ones.
 
 A distance from the training recordings cannot see a regime whose recordings lie among them: a
 starved pin knocks like a dry one. Shown some of its recordings, a straight line can.
@@ -32,7 +32,7 @@ REFUSED_AS_STRANGER = 0.005
 """Share of familiar recordings, left out of the fit, that may be taken for any of the strangers."""
 
 _FEWEST = 20  # of a kind, for a rate to within a tenth
-_TOLD = 0.5  # of a kind: where fewer are told from the familiar ones, it is no other kind
+_LEAST_DETECTED = 0.5  # of a kind: if fewer are recognised, it is not another kind
 
 
 def strangers_in(
@@ -51,11 +51,11 @@ def strangers_in(
     paths : sequence of str or Path
         Data sets, labelled or not, of the channels and the sample rate of the training set.
     head : Attributes
-        Of the training set.
+        Attributes of the training set.
     choice : FeatureSelection
-        Of the training set's features.
+        Selection of the training set's features.
     names : sequence of str
-        Of these features.
+        Names of these features.
     jobs, progress
         As of :func:`~.feature_rows.feature_table.feature_table`.
 
@@ -149,14 +149,14 @@ def _strangers(name: str, parts: Sequence[tuple[FeatureTable, NDArray[np.bool_]]
 
 
 def fit_strangers(training: TrainingRows, seed: int) -> tuple[tuple[Head, StrangerRates], ...]:
-    """What tells each kind of strangers from the familiar recordings.
+    """Fit a classifier of each kind of strangers against the familiar recordings.
 
     Parameters
     ----------
     training : TrainingRows
         Familiar ones, with the strangers.
     seed : int
-        Of the folds.
+        Seed of the folds.
 
     Returns
     -------
@@ -168,17 +168,17 @@ def fit_strangers(training: TrainingRows, seed: int) -> tuple[tuple[Head, Strang
     Raises
     ------
     DataError
-        Less than half the recordings of a kind are told from the familiar ones: they may be some.
+        Less than half the recordings of a kind are recognised: they may be familiar ones.
     """
     kinds = training.strangers
     found = tuple(_fit(training, each, REFUSED_AS_STRANGER / len(kinds), seed) for each in kinds)
-    alike = [rates for _, rates in found if rates.detection_rate < _TOLD]
+    alike = [rates for _, rates in found if rates.detection_rate < _LEAST_DETECTED]
     if alike:
         raise DataError(
             "\n".join(
                 f"refuse: {rates.detection_rate:.0%} of {rates.records} recordings of {rates.name} "
-                f"differ from those of the training set, must be >= {_TOLD:.0%}; leave them "
-                "out, or train on them"
+                f"differ from those of the training set, must be >= {_LEAST_DETECTED:.0%}; "
+                "leave them out, or train on them"
                 for rates in alike
             )
         )
@@ -188,7 +188,7 @@ def fit_strangers(training: TrainingRows, seed: int) -> tuple[tuple[Head, Strang
 def _fit(
     training: TrainingRows, strangers: Strangers, share: float, seed: int
 ) -> tuple[Head, StrangerRates]:
-    both = training.beside(strangers)
+    both = training.with_strangers(strangers)
     here = np.arange(len(both.rows)) >= len(training.rows)
     fitted = fit_head(
         strangers.name,

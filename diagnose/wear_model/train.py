@@ -87,11 +87,11 @@ def train_model(
         A split that the data set's file holds, in place of `held_out`: only its training side is
         learnt from, its test side is what is held out. The card has its name and hash.
     seed : int
-        Of the split, the folds and the trees.
+        Seed of the split, the folds and the trees.
     jobs : int
         Worker processes for the features.
     budget_ms : float, optional
-        Time that one prediction may take, beside the features [ms].
+        Time that one prediction may take, without the features [ms].
     baseline : str or Path, optional
         Data set of healthy records of the same machines, by identity (recipe, seed and number, or
         declared name): the model is then referenced, and needs healthy recordings of every machine
@@ -119,7 +119,7 @@ def train_model(
     DataError
         No such severity column or split, no limits, too few machine draws, machines unknown or
         without a healthy record, a budget that no model keeps, or recordings to refuse that have
-        other channels or are not told from the rest.
+        other channels or are not distinguished from the rest.
     """
     with DataSet(path) as data:
         head, draws = data.attributes, data.manifest["group"].nunique()
@@ -209,7 +209,7 @@ def fit_model(
     train : numpy.ndarray
         Rows that it may learn from.
     head : Attributes
-        Of the data set.
+        Attributes of the data set.
     target, held_out, seed, budget_ms
         As of :func:`train_model`; the share held out is for the card only.
     references : numpy.ndarray [shape=(n_records, n_features)], optional
@@ -221,7 +221,7 @@ def fit_model(
     strangers : tuple of Strangers
         Recordings to refuse, with the columns of the table.
     path : str or Path
-        Of the data set, for messages.
+        Name of the data set, for messages.
 
     Returns
     -------
@@ -285,7 +285,7 @@ def fit_model(
 
 
 def _selection(candidate_rows: Sequence["TrainingRows"], seed: int) -> Selection:
-    """Of one set there is nothing to choose."""
+    """Choose among sets of features; a single one is not judged."""
     if len(candidate_rows) == 1:
         return Selection(chosen=0, errors=(), by_fold=(0,) * FOLDS)
     first = candidate_rows[0]
@@ -465,7 +465,7 @@ def _card(
 def _conditions(
     table: FeatureTable, train: NDArray[np.intp], channels: Sequence[Channel]
 ) -> list[dict[str, Any]]:
-    """Trained ranges: of what the signal tells, and of what was noted beside it."""
+    """Trained ranges of conditions from the signal, and of those noted with it."""
     units = {f"{channel.name}.rms": channel.unit for channel in channels}
     columns = [
         {"name": name, "feature": name, "unit": units.get(name, _unit_in(name))}
@@ -477,12 +477,12 @@ def _conditions(
 
 
 def _unit_in(name: str) -> str:
-    """Of a feature, where its name ends with it; of a view's channel it is not known here."""
+    """Unit of a feature if its name ends with it; that of a view's channel is not known here."""
     return "Hz" if name.endswith("hz") else ""
 
 
 def _noted(manifest: pd.DataFrame) -> list[dict[str, Any]]:
-    """Conditions that vary and that no vibration tells, with their ranges."""
+    """Conditions that vary and do not follow from the vibration, with their ranges."""
     return [
         {"name": name, "feature": "", "unit": noted.unit}
         | _range(manifest[name].to_numpy(dtype=float))
@@ -524,7 +524,7 @@ def _model_card(learnt: Learnt, budget_ms: float | None) -> dict[str, Any]:
 def _healthy(training: TrainingRows, grade: NDArray[Any]) -> dict[str, list[float]]:
     """Mean and spread of the features of as-new machines, the reference of the evidence.
 
-    Of a referenced model the spread is that about each machine's own baseline.
+    For a referenced model the spread is that about each machine's own baseline.
     """
     kept = grade == 0 if (grade == 0).any() else np.ones(len(grade), dtype=bool)
     rows = training.rows[kept]

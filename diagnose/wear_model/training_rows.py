@@ -15,7 +15,7 @@ from ..healthy_reference.healthy import referenced_rows
 Float = NDArray[np.float64]
 
 FOLDS = 5
-"""Of whole machines, for every out-of-fold estimate."""
+"""Number of folds of whole machines, for every out-of-fold estimate."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +25,7 @@ class Strangers:
     Attributes
     ----------
     name : str
-        Of the kind, as ``lubrication_starved``.
+        Name of the kind, as ``lubrication_starved``.
     rows : numpy.ndarray [shape=(n, n_features)]
     groups : numpy.ndarray [shape=(n,)]
         Machine draw of each recording, >= 0.
@@ -46,7 +46,7 @@ class TrainingRows:
     Attributes
     ----------
     names : tuple of str
-        Of the features.
+        Feature names.
     rows : numpy.ndarray [shape=(n, n_features)]
     baseline : numpy.ndarray [shape=(n, n_features)] or None
         Healthy rows of the same machines.
@@ -57,9 +57,9 @@ class TrainingRows:
     conditions : tuple of str
         Noted conditions that vary.
     notes : sequence of mapping
-        What was noted beside each record; of no matter without conditions.
+        Conditions noted with each record; not used without `conditions`.
     faults : dict
-        Name -> presence [shape=(n,)] of each fault beside the wear.
+        Name -> presence [shape=(n,)] of each fault other than the wear.
     strangers : tuple of Strangers
         Recordings to refuse, with the same features.
     """
@@ -76,7 +76,7 @@ class TrainingRows:
 
     @property
     def inputs(self) -> Float:
-        """What the severity is told from."""
+        """Inputs of the severity estimate."""
         return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
 
     @property
@@ -109,7 +109,7 @@ class TrainingRows:
             strangers=tuple(replace(each, rows=each.rows[:, columns]) for each in self.strangers),
         )
 
-    def beside(self, strangers: Strangers) -> "TrainingRows":
+    def with_strangers(self, strangers: Strangers) -> "TrainingRows":
         """These records, and after them strangers of other machines, as rows alone."""
         first = int(self.groups.max()) + 1
         return TrainingRows(

@@ -21,7 +21,7 @@ NO_BASELINE = (
 
 @dataclass(frozen=True, kw_only=True)
 class FaultFinding:
-    """What a model says of a fault beside the wear.
+    """Finding of a model on a fault other than the wear.
 
     Attributes
     ----------
@@ -35,8 +35,8 @@ class FaultFinding:
         Share of present ones found, and of absent ones called present, on machines that had no
         part in the fit.
     visible_from_m : float or None
-        Of a regime: wear that is told from as new in nine of ten machines without part in the fit,
-        at 5 % false alarms [m]; less is not seen.
+        For a regime: wear that is distinguished from as new in nine of ten machines without part in
+        the fit, at 5 % false alarms [m]; less is not seen.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Estimate:
     mode : {"cold", "referenced"}
         Whether healthy recordings of the same machine were used.
     noted : tuple of str
-        Conditions noted beside the recording that the estimate is made with.
+        Conditions noted with the recording that the estimate uses.
     p_value : float or None
         Of the hypothesis that the recording is of the trained kind; None where it could not even
         be turned into the model's features.
@@ -102,13 +102,13 @@ class Estimate:
     possible_grades : tuple of int
         Those that cannot be excluded.
     grade_probabilities : tuple of float
-        Of every grade, sum 1.
+        Probability of every grade, sum 1.
     severity, low, high : float or None
         Estimate and interval [m].
     coverage : float
         Nominal coverage of the interval, and of the set.
     confounders : tuple of FaultFinding
-        Faults beside the wear that the model knows.
+        Faults other than the wear that the model knows.
     evidence : tuple of (str, float, float, float)
         Feature, its value, the healthy one (of the baseline, or mean of as-new machines), distance
         in standard deviations of healthy machines; the features that moved the most.
@@ -160,7 +160,7 @@ class Estimate:
 
     def _repr_html_(self) -> str:
         """The same for notebooks, with what must be known of it."""
-        told = {
+        texts_of = {
             "fault": [fault.text for fault in self.faults],
             "reason": self.reasons,
             "caution": self.cautions,
@@ -170,5 +170,5 @@ class Estimate:
                 if grade in self.possible_grades
             ],
         }
-        rows = [(name, text) for name, texts in told.items() for text in texts]
+        rows = [(name, text) for name, texts in texts_of.items() for text in texts]
         return html_table(repr(self)[1:-1], ["", "text"], rows)
