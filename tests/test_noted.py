@@ -1,5 +1,6 @@
 """Conditions noted beside a recording as inputs of a model."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,12 @@ import pytest
 from wearstate.diagnose.feature_rows.model_card import TrainedCondition
 from wearstate.diagnose.feature_rows.noted import NOTED, doubted, given_of, noted_values, strayed
 from wearstate.diagnose.learning.experts import FEWEST_RECORDS
+from wearstate.diagnose.nameplate.nameplate import nameplate_of
 from wearstate.diagnose.wear_model.bundle import ModelError, load_bundle
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import _worth_asking, learn
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
+from wearstate.sim.scene.load import scene_text
 
 NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
 N = 120
@@ -81,6 +84,15 @@ def test_what_few_know_is_taken_as_usual_and_not_called_noted():
     found = noted_values(names, [{"viscosity_pa_s": 1.0}, {"film_warming_k": 0.0}])
     np.testing.assert_array_equal(found, [[0.0, usual], [np.nan, 0.0]])
     assert given_of(names, {"viscosity_pa_s": 1.0, "film_warming_k": float("nan")}) == (names[0],)
+
+
+def test_a_suction_of_zero_is_a_pressure_and_no_missing_number(tmp_path):
+    """At an inlet 0 bar is the atmosphere; a film 0 K warmer is one that nobody noted."""
+    scene = tmp_path / "mine.toml"
+    text = re.sub(r"(?m)^suction = .*$", 'suction = "0 bar"', scene_text("bilge-pump"), count=1)
+    scene.write_text(text, encoding="utf-8")
+    known = nameplate_of(None, str(scene), {}).conditions({})
+    assert known == {"discharge_pressure_pa": 3e5, "suction_pressure_pa": 0.0}
 
 
 def test_half_of_the_training_records_lack_it_and_others_are_doubted_as_without_it():

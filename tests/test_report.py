@@ -281,6 +281,7 @@ def test_another_model_is_named_to_the_command(model_file, tmp_path):
     told = json.loads(run("report", one, *also, "--json").output)
     own = told["estimate"]
     assert told["other_model"]["severity"] == own["severity"]
+    assert told["other_model"]["origin"] == told["provenance"]["model"]
     assert told["other_model"]["agrees"]
     many = run("report", two, *also, code=2).output
     assert "--also is for one recording: name one, or choose a --record" in many
@@ -520,7 +521,8 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     assert "largest deviation from the machine&#39;s healthy recordings" in shown(page.read_text())
     stranger = written(tmp_path / "other.h5", [2.5e-4], groups=[60], seed=3)
     said = run("report", stranger, *args[2:], "--baseline", healthy, code=2).stderr
-    assert 'of machine 60 of recipe "knocking", seed 0, the machine of other.h5[0]' in said
+    wanted = 'must have some of machine 60 of recipe "knocking", seed 0, the machine of other.h5[0]'
+    assert wanted in said
     said = run(*args, "--baseline", page, code=2).stderr
     assert "must be a data set (.h5); make one of the healthy recordings" in said
     said = run(*args, "--baseline", worn, code=2).stderr

@@ -297,7 +297,7 @@ def test_a_recording_without_tacho_is_refused(recording):
     bare = replace(
         recording, signal=recording.vibration, channels=recording.channels[:2], tacho=None
     )
-    with pytest.raises(DataError, match="tacho with one pulse"):
+    with pytest.raises(DataError, match="tacho with one pulse per revolution is missing"):
         levels_of(bare)
 
 
@@ -477,7 +477,7 @@ def test_a_recording_that_a_twin_cannot_hear_gets_a_reason(mine, recording):
     )
     found = opinion.second_opinion(mine, bare)
     assert found.severity is None
-    assert "tacho with one pulse" in found.reason
+    assert "tacho with one pulse per revolution is missing" in found.reason
 
 
 def test_a_twin_of_another_wear_or_without_its_scene_is_refused(mine, recording, tmp_path):

@@ -27,6 +27,8 @@ class Noted:
         Its effect depends on ratios: its logarithm is the input.
     setting : str
         How the user gives it.
+    left_out : float, optional
+        Value in a scene that only means that the number was not given.
     usual : float, optional
         Value used if it was not noted, as in half of the training records; None: it must be known.
     """
@@ -35,6 +37,7 @@ class Noted:
     doubt: float
     log: bool
     setting: str
+    left_out: float | None = None
     usual: float | None = None
 
 
@@ -54,7 +57,12 @@ NOTED = {
     "hull_deflection_m": Noted(unit="m", doubt=0.05, log=False, setting='hull.deflection="0.2 mm"'),
     "thrust_n": Noted(unit="N", doubt=0.05, log=False, setting='propeller.thrust="700 kN"'),
     "film_warming_k": Noted(
-        unit="K", doubt=0.07, log=False, setting='bearings.0.film_warming="8 K"', usual=4.0
+        unit="K",
+        doubt=0.07,
+        log=False,
+        setting='bearings.0.film_warming="8 K"',
+        left_out=0.0,
+        usual=4.0,
     ),
 }
 """Manifest column -> condition. Pressure gauges are read to 2 %, the viscosity follows from the

@@ -136,8 +136,9 @@ def _has_place(scene: Any, path: str) -> bool:
 
 
 def _left_out(scene: Scene, column: str) -> bool:
-    """Whether a zero in the scene only means that the rarely known number was left out."""
-    return NOTED[column].usual is not None and condition_of(scene, column) == 0
+    """Whether the value in the scene only means that the rarely known number was not given."""
+    left_out = NOTED[column].left_out
+    return left_out is not None and condition_of(scene, column) == left_out
 
 
 def _replaced(scene: Any, path: str, value: float) -> Any:

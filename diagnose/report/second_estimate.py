@@ -5,7 +5,7 @@ assumed to be.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from ..film_clearance.clearance import FilmEstimate
@@ -27,6 +27,8 @@ class ModelOpinion:
         Nominal coverage of the interval.
     reasons : tuple of str
         Why there is no estimate.
+    origin : mapping
+        Origin of the model, its file's hash included, for the record.
     """
 
     trained_on: str
@@ -35,6 +37,7 @@ class ModelOpinion:
     high: float | None = None
     coverage: float = 0.9
     reasons: tuple[str, ...] = ()
+    origin: Mapping[str, Any] = field(default_factory=dict)
 
 
 SecondEstimate = FilmEstimate | TwinOpinion | ModelOpinion

@@ -21,7 +21,7 @@ from ..report.figures import draw_gauge
 from ..report.page import report_html
 from ..report.second_estimate import ModelOpinion
 from ..report.text import report_text
-from ..report.verdict import known_machine, report_table
+from ..report.verdict import known_machine, model_table, report_table
 from ..twin.opinion import TwinOpinion, second_opinion
 from ..wear_model.estimate import WearModel
 from ..wear_model.file import load_model
@@ -302,6 +302,7 @@ def _other_opinion(
         high=estimate.high,
         coverage=estimate.coverage,
         reasons=estimate.reasons,
+        origin=model_table(other, None if isinstance(also, WearModel) else Path(also)),
     )
 
 

@@ -336,7 +336,7 @@ class SceneCheck:
     """
 
     name: str
-    machine: type[Scene]
+    machine: type  # Scene for every machine
     function: Callable[[Any], Iterator[str]]
     usual: str
 

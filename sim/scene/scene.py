@@ -4,6 +4,7 @@ Validation reports all faults together, each as a dotted path with value, bound 
 suggests the nearest match of an unknown key. Kernels trust validated scenes.
 """
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
@@ -201,13 +202,13 @@ class Scene(Part):
         rows = [(name, text) for name, text in parts.items() if text]
         return html_table(repr(self)[1:-1], ["part", ""], rows)
 
+    @abstractmethod
     def sensor_channels(self) -> tuple[Channel, ...]:
-        """Channels of the sensors, in order; each machine has its own."""
-        raise NotImplementedError(self.machine)
+        """Channels of the sensors, in order."""
 
+    @abstractmethod
     def sensor_parts(self) -> tuple[Any, ...]:
         """Sensors with a range and a noise, one for each sensor channel, in order."""
-        raise NotImplementedError(self.machine)
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
