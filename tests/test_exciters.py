@@ -17,7 +17,7 @@ from wearstate.features.response.mimo import multiple_h1
 from wearstate.sim.excitation.forces import exciter_push, stepped_frequencies
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
-from wearstate.sim.scene.exciters import Exciter, PlacedExciter
+from wearstate.sim.scene.exciters import Exciter, ShaftExciter
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError, channels_of
 from wearstate.sim.shaft.at_rest import reduced_rotor, shaft_state
@@ -43,7 +43,7 @@ STILL = {
 
 
 def part(**values):
-    return PlacedExciter(**{"range": 1e6, "force": 20.0, **values})
+    return ShaftExciter(**{"range": 1e6, "force": 20.0, "place": "aft", **values})
 
 
 def push(seed=1, n=65536, fs=FS, index=0, lead=0, **values):

@@ -10,9 +10,9 @@ from wearstate.diagnose.feature_rows.feature_table import recording_features, re
 from wearstate.diagnose.pictures.view import View
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import Recording
+from wearstate.sim.parts.sensors import PressureSensor
 from wearstate.sim.pump.pressure_sensors import read_pressure
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.pump_hydraulics import PressureSensor
 from wearstate.sim.scene.scene import SceneError
 
 SENSOR = {"pressure.sensor.range": "10 bar"}

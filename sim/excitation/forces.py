@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output.sensor import digitise
-from ..scene.exciters import Exciter, PlacedExciter
+from ..scene.exciters import Exciter, ShaftExciter
 
 Float = NDArray[np.float64]
 
@@ -316,7 +316,7 @@ def _blows(part: Exciter, duration: float, rng: np.random.Generator) -> list[_Bl
     begins = stretch * (np.arange(count) + rng.uniform(_BLOW_FROM, _BLOW_TO, count))
     peaks = part.force * rng.lognormal(0.0, part.peak_scatter, count)
     angles = part.angle_scatter * rng.standard_normal(count)
-    width = part.place_scatter if isinstance(part, PlacedExciter) else 0.0
+    width = part.place_scatter if isinstance(part, ShaftExciter) else 0.0
     offset = width * rng.standard_normal(count)
     twice = rng.uniform(size=count) < part.double_hits
     delays = rng.uniform(*_REBOUND_AFTER, count) + part.contact_time

@@ -18,8 +18,7 @@ from ..output.sensor import digitise, floor_of
 from ..output.status import SimulationError, Status
 from ..output.track import track_under
 from ..scene.journal import JournalLoad, JournalScene
-from ..scene.recorded import failed, recorded
-from ..scene.sampling import duration_faults, memory_faults, tacho_faults
+from ..scene.recorded import duration_faults, failed, memory_faults, recorded, tacho_faults
 from ..scene.scene import Scene, SceneError
 from .load import Load, half_sine_history, load, loads_at, rectangular_history, step_history
 from .orbit import FilmTrace, OrbitRun, film_trace, run_orbit

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ..journal.ladder import FILM_LADDER
 from ..output.transfer import SceneTransfer
+from ..scene.exciters import ShaftExciter
 from ..scene.scene import Scene, SceneError
 from ..scene.shaft import ShaftScene
-from ..scene.shaft_parts import ShaftExciter
 from ..shaft.at_rest import shaft_state
 from ..shaft.ladder import BEAM_RUNGS, shaft_cost, shaft_effects
 from ..shaft.push import exciter_place

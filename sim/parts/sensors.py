@@ -1,4 +1,4 @@
-"""Accelerometer and tacho: their channels, noise, range and filters."""
+"""Accelerometer, pressure sensor and tacho: their channels, noise, range and filters."""
 
 import math
 from collections.abc import Sequence
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ..output.sensor import Channel, tacho_pulses
-from .dimensions import Acceleration, Angle, Frequency, Ratio, Voltage
-from .limits import GAIN_LEAST, GAIN_MOST, MODE_FASTEST, NAME_LONGEST
+from .dimensions import Acceleration, Angle, Frequency, Pressure, Ratio, Time, Voltage
+from .limits import GAIN_LEAST, GAIN_MOST, MODE_FASTEST, NAME_LONGEST, PRESSURE_MOST
 from .part import Part
 
 _ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor ends at 1e6
@@ -21,6 +21,10 @@ _FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no sign
 _FILTER_STEEPEST = 10  # order; eight is usual
 
 _DAMPING_LEAST = 1e-3  # glued steel has about 0.01
+
+_SENSOR_SLOWEST, _SENSOR_FASTEST = 1.0, 1e6  # Hz: no stroke visible below, no effect above
+_SENSOR_LEAST = 1.0  # Pa, a microphone's range
+_LINE_DAMPING_MOST = 0.99  # of an underdamped line
 
 AXES = {"x": "along the stroke", "y": "across the stroke", "z": "along the shaft"}
 """Axes of a triaxial accelerometer, in the frame of the machine."""
@@ -83,7 +87,8 @@ class Accelerometer(Part):
 
     @model_validator(mode="after")
     def _whole_and_once(self) -> Self:
-        faults = [*self._axis_faults(), *self._mounting_faults(), *self._filter_faults()]
+        pair = _pair_faults(self, "mounting_resonance", "mounting_damping")
+        faults = [*self._axis_faults(), *pair, *self._filter_faults()]
         if faults:
             raise ValueError("\n".join(faults))
         return self
@@ -103,16 +108,6 @@ class Accelerometer(Part):
                 "axis to follow; shorten it"
             )
         return faults
-
-    def _mounting_faults(self) -> list[str]:
-        given = (self.mounting_resonance is not None, self.mounting_damping is not None)
-        if given[0] == given[1]:
-            return []
-        lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
-        value = getattr(self, f"mounting_{lone}")
-        return [
-            f"mounting_{lone} = {value:g} needs mounting_{other} as well; add it or remove both"
-        ]
 
     def _filter_faults(self) -> list[str]:
         fields = ("anti_alias_cutoff", "anti_alias_order")
@@ -148,6 +143,81 @@ def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
         for sensor in sensors
         for axis in (sensor.axes or ("",))
     )
+
+
+class PressureSensor(Part):
+    """A pressure transmitter at the cylinder, with its connecting line and converter.
+
+    It reads gauge pressure from absolute vacuum, -101,325 Pa, to the upper end of its range.
+
+    Notes
+    -----
+    A liquid-filled line oscillates on the compliance C of what it leads to, with the inertance
+    ``rho L / A``: ``f = sqrt(A / (rho L C)) / (2 pi)`` [1]_. Usual values: a flush membrane has
+    none; 0.3 m of 4 mm tube up to a membrane quarter-wave rings at 1.2 kHz, and with a bubble of
+    0.05 cm^3 in it (``C = V / (1.4 p)``) at some 60 Hz. The line lags by ``zeta / (pi f)``; the
+    transmitter's own time constant adds to that.
+
+    References
+    ----------
+    .. [1] E. O. Doebelin, Measurement Systems, 5th ed., McGraw-Hill 2004, section 6.6, dynamic
+       effects of volumes and connecting tubing.
+    """
+
+    name: str = Field(
+        default="pressure", min_length=1, max_length=NAME_LONGEST - 3, description="channel name"
+    )
+    place: str = Field(default="cylinder", description="location, for the report")
+    range: Pressure = Field(
+        ge=_SENSOR_LEAST, le=PRESSURE_MOST, description="upper end of the range, gauge"
+    )
+    gain: Ratio = Field(
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
+    )
+    offset: Pressure = Field(
+        default=0.0,
+        ge=-PRESSURE_MOST,
+        le=PRESSURE_MOST,
+        description="reading at atmospheric pressure",
+    )
+    noise: Pressure = Field(default=0.0, ge=0, le=PRESSURE_MOST, description="rms of white noise")
+    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
+    lag: Time | None = Field(
+        default=None,
+        ge=1 / (math.tau * _SENSOR_FASTEST),
+        le=1 / (math.tau * _SENSOR_SLOWEST),
+        description="time constant of the transmitter, first order; none: no lag",
+    )
+    line_resonance: Frequency | None = Field(
+        default=None,
+        ge=_SENSOR_SLOWEST,
+        le=_SENSOR_FASTEST,
+        description="resonance of the connecting line; none: flush membrane",
+    )
+    line_damping: Ratio | None = Field(
+        default=None,
+        ge=_DAMPING_LEAST,
+        le=_LINE_DAMPING_MOST,
+        description="damping ratio of the line",
+    )
+
+    @model_validator(mode="after")
+    def _line_whole(self) -> Self:
+        faults = _pair_faults(self, "line_resonance", "line_damping")
+        if faults:
+            raise ValueError(*faults)
+        return self
+
+
+def _pair_faults(sensor: Part, *names: str) -> list[str]:
+    """Find one of two values that is given without the other."""
+    given = {name: getattr(sensor, name) for name in names if getattr(sensor, name) is not None}
+    return [
+        f"{name} = {value:g} needs {other} as well; add it or remove both"
+        for name, value in given.items()
+        for other in names
+        if other not in given
+    ]
 
 
 class Tacho(Part):

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output.sensor import digitise, low_pass, mounting_poles
+from ..parts.sensors import PressureSensor
 from ..scene.pump import PumpScene
-from ..scene.pump_hydraulics import PIPED_RUNGS, STANDARD_ATMOSPHERE, PressureSensor
+from ..scene.pump_hydraulics import PIPED_RUNGS, STANDARD_ATMOSPHERE
 
 Float = NDArray[np.float64]
 

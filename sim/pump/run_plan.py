@@ -10,7 +10,7 @@ from ..excitation.forces import Push
 from ..output.status import Status
 from ..scene.exciters import pushing_faults
 from ..scene.pump import PumpScene
-from ..scene.sampling import MEMORY, duration_faults, memory_faults, tacho_faults
+from ..scene.recorded import MEMORY, duration_faults, memory_faults, tacho_faults
 from ..scene.scene import SceneError
 from .push import casing_pushes
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step

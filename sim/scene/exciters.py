@@ -1,7 +1,6 @@
 """Shaker or instrumented hammer of a scene: its force, and what its force cell reads.
 
-Its point of application belongs to the machine: :mod:`.scene.shaft`, :mod:`.scene.pump`. The force
-signal is made in :mod:`.excitation.forces`.
+The force signal is made in :mod:`.excitation.forces`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,7 +10,7 @@ from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
 from ..parts.dimensions import Angle, Force, Frequency, Length, Ratio, Time
-from ..parts.limits import FORCE_MOST, GAIN_LEAST, GAIN_MOST, NAME_LONGEST
+from ..parts.limits import FORCE_MOST, GAIN_LEAST, GAIN_MOST, LONGEST, NAME_LONGEST
 from ..parts.part import Part
 from .scene import Scene
 
@@ -105,12 +104,55 @@ class CasingExciter(Exciter):
         return self
 
 
-class PlacedExciter(Exciter):
-    """An exciter on a shaft, whose blows also scatter along the shaft."""
+class ShaftExciter(Exciter):
+    """A shaker or hammer on the shaft or on a bearing's housing, while the line runs.
+
+    No test at standstill is modelled: the journals would then lie on metal. Blows on the shaft
+    also scatter along it.
+    """
 
     place_scatter: Length = Field(
         default=0.0, ge=0, le=1.0, description="scatter of the blows along the shaft"
     )
+    place: str = Field(
+        default="", max_length=NAME_LONGEST, description="name of a bearing or a disc"
+    )
+    station: Length | None = Field(
+        default=None,
+        ge=0,
+        le=LONGEST,
+        description="station on the shaft, instead of a place",
+    )
+    part: Literal["shaft", "housing"] = Field(default="shaft", description="part that it acts on")
+    direction: Literal["up", "side"] = Field(default="up", description="up or side")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        faults = []
+        if bool(self.place) == (self.station is not None):
+            faults.append(
+                f"{'both' if self.place else 'neither'} of place and station given, must be "
+                "exactly one; remove or add one"
+            )
+        if self.part == "housing" and self.place_scatter:
+            faults.append(
+                f"place_scatter = {self.place_scatter:g} m must be 0 on a housing, which does not "
+                "tilt in this model; set part = 'shaft' or remove it"
+            )
+        if self.part == "housing" and self.station is not None:
+            faults.append(
+                f"station = {self.station:g} m names no housing; name a bearing as place instead"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @property
+    def where(self) -> str:
+        """Description for people: ``shaft at forward``, ``housing of forward``."""
+        if self.part == "housing":
+            return f"housing of {self.place}"
+        return f"shaft at {self.place or f'{self.station:g} m'}"
 
 
 def force_channel(part: Exciter, place: str, direction: str) -> Channel:

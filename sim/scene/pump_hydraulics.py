@@ -10,28 +10,24 @@ from ..parts.dimensions import (
     Area,
     Damping,
     Density,
-    Frequency,
     Length,
     Mass,
     Pressure,
     Ratio,
     Stiffness,
-    Time,
     Velocity,
     Volume,
 )
 from ..parts.limits import (
     DAMPING_MOST,
-    GAIN_LEAST,
-    GAIN_MOST,
     HEAVIEST,
     LIGHTEST,
     LONGEST,
-    NAME_LONGEST,
     PRESSURE_MOST,
     STIFFEST,
 )
 from ..parts.part import Part
+from ..parts.sensors import PressureSensor
 from ..parts.units import STANDARD_GRAVITY
 
 STANDARD_ATMOSPHERE = 101325.0  # Pa, ISO 2533; gauge pressures count from it
@@ -47,9 +43,6 @@ _LEVEL_MOST = 1e4  # m
 _MOST_VALVES = 100
 _WAVE_SLOWEST, _WAVE_FASTEST = 10.0, 5000.0  # m/s, from a froth to solid steel
 _CONTACT_FASTEST = 1e6  # rad/s, a ball of a gram on hard steel has half of it
-_SENSOR_SLOWEST, _SENSOR_FASTEST = 1.0, 1e6  # Hz: no stroke visible below, no effect above
-_SENSOR_LEAST = 1.0  # Pa, a microphone's range
-_DAMPING_LEAST, _DAMPING_RATIO_MOST = 1e-3, 0.99  # of an underdamped line
 
 
 class Liquid(Part):
@@ -274,74 +267,6 @@ class Valve(Part):
             f"seat_stiffness = {self.seat_stiffness:g} N/m gives a contact of {rate:g} rad/s on "
             f"mass = {self.mass:g} kg, must be <= {_CONTACT_FASTEST:g} rad/s; soften the seat"
         ]
-
-
-class PressureSensor(Part):
-    """A pressure transmitter at the cylinder, with its connecting line and converter.
-
-    It reads gauge pressure from absolute vacuum, -101,325 Pa, to the upper end of its range.
-
-    Notes
-    -----
-    A liquid-filled line oscillates on the compliance C of what it leads to, with the inertance
-    ``rho L / A``: ``f = sqrt(A / (rho L C)) / (2 pi)`` [1]_. Usual values: a flush membrane has
-    none; 0.3 m of 4 mm tube up to a membrane quarter-wave rings at 1.2 kHz, and with a bubble of
-    0.05 cm^3 in it (``C = V / (1.4 p)``) at some 60 Hz. The line lags by ``zeta / (pi f)``; the
-    transmitter's own time constant adds to that.
-
-    References
-    ----------
-    .. [1] E. O. Doebelin, Measurement Systems, 5th ed., McGraw-Hill 2004, section 6.6, dynamic
-       effects of volumes and connecting tubing.
-    """
-
-    name: str = Field(
-        default="pressure", min_length=1, max_length=NAME_LONGEST - 3, description="channel name"
-    )
-    place: str = Field(default="cylinder", description="location, for the report")
-    range: Pressure = Field(
-        ge=_SENSOR_LEAST, le=PRESSURE_MOST, description="upper end of the range, gauge"
-    )
-    gain: Ratio = Field(
-        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
-    )
-    offset: Pressure = Field(
-        default=0.0,
-        ge=-PRESSURE_MOST,
-        le=PRESSURE_MOST,
-        description="reading at atmospheric pressure",
-    )
-    noise: Pressure = Field(default=0.0, ge=0, le=PRESSURE_MOST, description="rms of white noise")
-    bits: int = Field(default=24, ge=8, le=32, description="resolution of the converter")
-    lag: Time | None = Field(
-        default=None,
-        ge=1 / (math.tau * _SENSOR_FASTEST),
-        le=1 / (math.tau * _SENSOR_SLOWEST),
-        description="time constant of the transmitter, first order; none: no lag",
-    )
-    line_resonance: Frequency | None = Field(
-        default=None,
-        ge=_SENSOR_SLOWEST,
-        le=_SENSOR_FASTEST,
-        description="resonance of the connecting line; none: flush membrane",
-    )
-    line_damping: Ratio | None = Field(
-        default=None,
-        ge=_DAMPING_LEAST,
-        le=_DAMPING_RATIO_MOST,
-        description="damping ratio of the line",
-    )
-
-    @model_validator(mode="after")
-    def _line_whole(self) -> Self:
-        given = (self.line_resonance is not None, self.line_damping is not None)
-        if given[0] != given[1]:
-            lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
-            raise ValueError(
-                f"line_{lone} = {getattr(self, f'line_{lone}'):g} needs line_{other} as well; "
-                "add it or remove both"
-            )
-        return self
 
 
 PIPED_RUNGS = ("lumped-lines", "wave-lines")

@@ -13,7 +13,7 @@ from ..parts.limits import MOST_SENSORS
 from ..parts.oil import Oil
 from ..parts.sensors import Tacho, acceleration_channel, displacement_channel
 from ..parts.units import STANDARD_GRAVITY
-from .exciters import force_channel
+from .exciters import ShaftExciter, force_channel
 from .journal import Dent, Film, RunOut
 from .scene import (
     SPEED,
@@ -36,7 +36,6 @@ from .shaft_parts import (
     ShaftConditions,
     ShaftDisc,
     ShaftDrive,
-    ShaftExciter,
     ShaftLoad,
     ShaftMaterial,
     ShaftProbe,

@@ -43,7 +43,6 @@ from ..parts.limits import (
     STIFFEST,
 )
 from ..parts.part import Part
-from .exciters import PlacedExciter
 from .journal import ProximityProbe, ScarLimits
 
 _MOMENT_MOST = 1e9  # N m
@@ -475,50 +474,6 @@ class Turbulence(Part):
     place: _Name = Field(description="name of a disc or of a bearing, whose housing it pushes")
     force: Force = Field(ge=0, le=FORCE_MOST, description="rms over all frequencies")
     corner: Frequency = Field(gt=0, le=1e6, description="frequency above which the force falls")
-
-
-class ShaftExciter(PlacedExciter):
-    """A shaker or hammer on the shaft or on a bearing's housing, while the line runs.
-
-    No test at standstill is modelled: the journals would then lie on metal.
-    """
-
-    place: str = Field(
-        default="", max_length=NAME_LONGEST, description="name of a bearing or a disc"
-    )
-    station: _Station | None = Field(
-        default=None, description="station on the shaft, instead of a place"
-    )
-    part: Literal["shaft", "housing"] = Field(default="shaft", description="part that it acts on")
-    direction: Literal["up", "side"] = Field(default="up", description="up or side")
-
-    @model_validator(mode="after")
-    def _one_place(self) -> Self:
-        faults = []
-        if bool(self.place) == (self.station is not None):
-            faults.append(
-                f"{'both' if self.place else 'neither'} of place and station given, must be "
-                "exactly one; remove or add one"
-            )
-        if self.part == "housing" and self.place_scatter:
-            faults.append(
-                f"place_scatter = {self.place_scatter:g} m must be 0 on a housing, which does not "
-                "tilt in this model; set part = 'shaft' or remove it"
-            )
-        if self.part == "housing" and self.station is not None:
-            faults.append(
-                f"station = {self.station:g} m names no housing; name a bearing as place instead"
-            )
-        if faults:
-            raise ValueError("\n".join(faults))
-        return self
-
-    @property
-    def where(self) -> str:
-        """Description for people: ``shaft at forward``, ``housing of forward``."""
-        if self.part == "housing":
-            return f"housing of {self.place}"
-        return f"shaft at {self.place or f'{self.station:g} m'}"
 
 
 # --- sensors

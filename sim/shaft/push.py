@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation.forces import Push, exciter_push, half_sine
+from ..scene.exciters import ShaftExciter
 from ..scene.shaft import ShaftScene
-from ..scene.shaft_parts import ShaftExciter
 from ..shaft_response.places import Place
 from ..shaft_response.reduced import ReducedRotor
 from ..shaft_response.time_response import Transient, time_response

@@ -19,8 +19,7 @@ from ..output.sensor import digitise, floor_of
 from ..output.status import SimulationError, Status
 from ..output.track import track_under
 from ..scene.exciters import pushing_faults
-from ..scene.recorded import failed, recorded
-from ..scene.sampling import duration_faults, memory_faults, tacho_faults
+from ..scene.recorded import duration_faults, failed, memory_faults, recorded, tacho_faults
 from ..scene.scene import Scene, SceneError
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import ShaftAccelerometer, ShaftProbe
