@@ -14,7 +14,7 @@ from ..scene.rungs import Effect, Rung, admissible, with_values
 from ..scene.scene import Scene, SceneError, pinned_faults
 from .comparison import Comparison
 from .differences import Candidate
-from .ladder import cost_of, effects_of
+from .ladder import effects_of
 from .pilot import Pilot
 from .runs import Quantities
 
@@ -187,7 +187,7 @@ def resolve(
     comparison, dropped = _without_failing_rungs(comparison, effects)
     refuse_bad_reference(comparison)
     if starts is None:
-        comparison.starts = affordable_starts(reference_cost(comparison))
+        comparison.starts = affordable_starts(comparison.cost(comparison.top))
     singles = descent(comparison)
     chosen = next(
         (found for found in combinations(comparison, singles) if found.verdict == "within"),
@@ -244,11 +244,6 @@ def dropped_text(name: str, bad: Rung, instead: Rung, fault: str) -> str:
         f"{name} = {bad.name}: fails on this machine, {fault}; errors are relative to "
         f"{name} = {instead.name}"
     )
-
-
-def reference_cost(comparison: Comparison) -> float:
-    """Tabulated time of a run of the reference [s]."""
-    return cost_of(with_values(comparison.pilot.scene, comparison.values(comparison.top)))
 
 
 def affordable_starts(cost: float) -> int:
@@ -313,9 +308,7 @@ def descent(comparison: Comparison) -> dict[str, list[Single]]:
 
 def _lowest_cost(comparison: Comparison, name: str) -> float:
     """Cost of the best combination with the cheapest rung of one effect."""
-    scene = comparison.pilot.scene
-    values = (comparison.values({**comparison.top, name: rung}) for rung in comparison.rungs[name])
-    return min(cost_of(with_values(scene, each)) for each in values)
+    return min(comparison.cost({**comparison.top, name: r}) for r in comparison.rungs[name])
 
 
 def leaves_room(candidate: Candidate, accuracy: float) -> bool:
@@ -345,8 +338,7 @@ def combinations(
         added = [each for _, _, each in combination if each is not None]
         if largest_sum(added) <= comparison.accuracy:
             rungs = {name: rung for name, rung, _ in combination}
-            cost = cost_of(with_values(comparison.pilot.scene, comparison.values(rungs)))
-            ranked.append((cost, len(ranked), rungs))
+            ranked.append((comparison.cost(rungs), len(ranked), rungs))
     for _, _, rungs in sorted(ranked, key=lambda row: row[:2]):
         yield comparison.judge(rungs)
 

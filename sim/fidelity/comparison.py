@@ -38,6 +38,7 @@ class Comparison:
     ) -> None:
         self.pilot, self.accuracy, self.starts = pilot, accuracy, starts
         self.rungs = ladders
+        self.lowest = {name: rungs[0] for name, rungs in ladders.items() if rungs}
         self.top = {name: rungs[-1] for name, rungs in ladders.items() if rungs}
         self.cap = math.inf  # present limit of starts
         self._kept: dict[tuple[tuple[str, str], ...], Candidate] = {}
@@ -58,6 +59,14 @@ class Comparison:
     def values(self, rungs: Mapping[str, Rung]) -> dict[str, Any]:
         """Values of a combination."""
         return {path: value for rung in rungs.values() for path, value in rung.values.items()}
+
+    def cost(self, rungs: Mapping[str, Rung]) -> float:
+        """Time of a run of a combination by the tables [s]."""
+        return cost_of(with_values(self.pilot.scene, self.values(rungs)))
+
+    def is_top(self, candidate: Candidate) -> bool:
+        """Whether a candidate is the reference."""
+        return _names_of(candidate) == names(self.top)
 
     def judge(self, rungs: Mapping[str, Rung]) -> Candidate:
         """Candidate of a combination, with its verdict; evaluated again if more starts may help."""
@@ -143,7 +152,7 @@ class Comparison:
     ) -> Candidate:
         values = self.values(rungs)
         try:
-            cost = cost_of(with_values(self.pilot.scene, values))
+            cost = self.cost(rungs)
         except SceneError:
             cost = math.inf
         return Candidate(

@@ -7,10 +7,9 @@ import math
 from collections.abc import Mapping, Set
 from itertools import product
 
-from ..scene.rungs import Rung, with_values
+from ..scene.rungs import Rung
 from .choose import added_differences, largest_sum, leaves_room
 from .comparison import Comparison
-from .ladder import cost_of
 
 SPARED = 1.5  # a predicted error up to this factor behind the front is run, as sums are estimates
 
@@ -86,8 +85,7 @@ def by_cost(
             for name, rung in rungs.items()
             if rung is not comparison.top[name]
         ]
-        cost = cost_of(with_values(comparison.pilot.scene, comparison.values(rungs)))
-        rows.append((cost, largest_sum(alone), len(rows), rungs))
+        rows.append((comparison.cost(rungs), largest_sum(alone), len(rows), rungs))
     front, least = [], math.inf
     for _, error, _, rungs in sorted(rows, key=lambda row: row[:3]):
         if error < least * SPARED:

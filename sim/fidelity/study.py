@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
-from ..scene.rungs import STEP_LEVELS, Rung, level_name, with_values
+from ..scene.rungs import STEP_LEVELS, Rung, level_name
 from ..scene.scene import Scene
 from .choose import (
     affordable_starts,
@@ -23,7 +23,6 @@ from .choose import (
     first_cured,
     free_effects,
     largest_sum,
-    reference_cost,
     refusals,
     refuse_bad_reference,
 )
@@ -32,7 +31,6 @@ from .convergence import convergence_of
 from .differences import FIRST, Candidate, surely_within
 from .findings import Answer, Convergence, Raise, Study, unconverged
 from .front import SPARED, by_cost, cheapest_numerics, single_changes, undominated
-from .ladder import cost_of
 from .pilot import OutOfTimeError, Pilot
 from .runs import Quantities
 from .time_left import seconds_of_doubts, seconds_of_front
@@ -94,6 +92,7 @@ class Search:
         self.written = {each.name: written_rung(each, scene) for each in self.effects}
         self.ladders = {each.name: ladder(each, scene) for each in self.effects}
         self._starts = starts
+        self._cap = math.inf  # present limit of starts
         self.share = 1.0  # share of a full run's simulated time
         self.kept = self._comparison(
             {n: r if n in self.numerical else (self.written[n],) for n, r in self.ladders.items()}
@@ -123,7 +122,8 @@ class Search:
         scene, speed = self.scene, float(value_at(self.scene, "drive.speed"))
         settling = scene.settling_revolutions / speed
         whole = scene.duration + settling
-        affordable = whole * _EXPENSIVE / reference_cost(self.best or self.kept) - settling
+        widest = self.best or self.kept
+        affordable = whole * _EXPENSIVE / widest.cost(widest.top) - settling
         turns = max(fewest_turns, math.ceil(affordable * speed))
         if turns / speed >= scene.duration:
             return
@@ -140,8 +140,9 @@ class Search:
     def _comparison(self, ladders: Mapping[str, Sequence[Rung]]) -> Comparison:
         found = Comparison(self.pilot, ladders, self.accuracy, self._starts or 1)
         if self._starts is None:
-            found.starts = affordable_starts(reference_cost(found))
+            found.starts = affordable_starts(found.cost(found.top))
         found.starts <<= self._more_starts()
+        found.cap = self._cap
         return found
 
     def _whole(self) -> Comparison | None:
@@ -212,6 +213,7 @@ class Search:
         return [self.kept, *([self.best] if self.best and not self.fault else [])]
 
     def _round(self, cap: float) -> None:
+        self._cap = cap
         for each in self._all():
             each.cap = cap
         self.report("numerics of the scene as written")
@@ -240,7 +242,7 @@ class Search:
         """Error of a rung of the scene as written, relative to the best working one."""
         while name in self.raises:
             pair = self.raises[name]
-            pair.judge({n: rungs[0] for n, rungs in pair.rungs.items()})
+            pair.judge(pair.lowest)
             fault = self.pilot.fault(pair.values(pair.top))
             if not fault:
                 return
@@ -265,18 +267,12 @@ class Search:
         *lower, bad = self.ladders[name]
         self.ladders = {**self.ladders, name: tuple(lower)}
         self._dropped.append(dropped_text(name, bad, lower[-1], fault))
-        if name in self.raises:
-            cap = self.raises.pop(name).cap
-            if self._low(name):
-                self.raises[name] = self._raise(name)
-                self.raises[name].cap = cap
+        if self.raises.pop(name, None) and self._low(name):
+            self.raises[name] = self._raise(name)
         if self.best is not None:
-            cap = self.best.cap
             self._done.discard(id(self.best))
             self._convergence.pop(id(self.best), None)
             self.best = self._whole()
-            if self.best is not None:
-                self.best.cap = cap
 
     def _answered(self, comparison: Comparison) -> None:
         """Search a comparison for its cheapest sufficient combination."""
@@ -331,10 +327,9 @@ class Search:
     def _cheapest(self, comparison: Comparison) -> Candidate | None:
         """Present choice; None if it is the reference."""
         room = self._room(comparison)
-        top = {name: rung.name for name, rung in comparison.top.items()}
         judged = sorted(comparison.judged(), key=lambda c: (c.cost, c.error))
         found = next((c for c in judged if c.verdict == "within" and self._fits(c, room)), None)
-        return None if found is None or dict(found.rungs) == top else found
+        return None if found is None or comparison.is_top(found) else found
 
     def _room(self, comparison: Comparison) -> float:
         """Accuracy left after the reference's own error."""
@@ -347,8 +342,7 @@ class Search:
         for combination in product(*choices):
             if largest_sum([added for _, added in combination]) <= self.accuracy:
                 rungs = dict(zip(best.rungs, (rung for rung, _ in combination), strict=True))
-                cost = cost_of(with_values(self.scene, best.values(rungs)))
-                rows.append((cost, len(rows), rungs))
+                rows.append((best.cost(rungs), len(rows), rungs))
         yield from (rungs for _, _, rungs in sorted(rows, key=lambda row: row[:2])[:_SHORTLIST])
 
     def _predicted(self, best: Comparison, name: str) -> list[tuple[Rung, dict[str, float]]]:
@@ -356,7 +350,7 @@ class Search:
         rows: list[tuple[Rung, dict[str, float]]] = [(best.top[name], {})]
         if name in self.raises:
             pair = self.raises[name]
-            own = pair.judge({n: rungs[0] for n, rungs in pair.rungs.items()})
+            own = pair.judge(pair.lowest)
             if own.differences:
                 rows.append((self.written[name], {n: d.mean for n, d in own.differences.items()}))
         elif name in self.numerical:
@@ -472,21 +466,16 @@ class Search:
 
     def _raises(self) -> Iterator[Raise]:
         for name, pair in self.raises.items():
-            candidate = pair.known({n: rungs[0] for n, rungs in pair.rungs.items()})
-            if candidate is not None:
-                best = pair.top[name].name
-                yield Raise(
-                    effect=name, written=self.written[name].name, best=best, candidate=candidate
-                )
+            found = pair.known(pair.lowest)
+            if found is not None:
+                own, best = self.written[name].name, pair.top[name].name
+                yield Raise(effect=name, written=own, best=best, candidate=found)
 
     def _answer(self, comparison: Comparison) -> Answer:
         judged = [self._with_seconds(c) for c in comparison.judged()]
         judged.sort(key=lambda c: (c.cost, c.error))
-        top = {name: rung.name for name, rung in comparison.top.items()}
-        reference = next(
-            (c for c in judged if dict(c.rungs) == top),
-            self._with_seconds(comparison.reference()),
-        )
+        measured = (c for c in judged if comparison.is_top(c))
+        reference = next(measured, self._with_seconds(comparison.reference()))
         convergence = tuple(self._convergence.get(id(comparison), ()))
         left = unconverged(convergence)
         status = self._answer_status(comparison, left)
@@ -494,7 +483,7 @@ class Search:
         room = self._room(comparison)
         likely = [c for c in judged if c.verdict in unsure and self._fits(c, room)]
         chosen = next(iter(likely), reference)
-        if status == "so far" and dict(chosen.rungs) == top:
+        if status == "so far" and comparison.is_top(chosen):
             chosen = _best_bet(judged, reference) or reference
         doubted = [c for c in comparison.doubted() if c.cost < chosen.cost]
         own = comparison.known(self.written)
