@@ -20,7 +20,7 @@ from wearstate.datasets.recipe.text import toml_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.report import report_exit
 from wearstate.diagnose.healthy_reference.healthy import Baseline, Baselines
-from wearstate.diagnose.nameplate.nameplate import Nameplate
+from wearstate.diagnose.nameplate.nameplate import Nameplate, nameplate_of
 from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.recording_faults.fault import QualityFault
 from wearstate.diagnose.report import page as page_module
@@ -41,6 +41,7 @@ from wearstate.diagnose.twin.opinion import TwinOpinion
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
 from wearstate.diagnose.wear_model.verdict import Estimate, FaultFinding
+from wearstate.diagnose.workflow import report as workflow_report
 from wearstate.diagnose.workflow.report import Report
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
@@ -272,17 +273,110 @@ def test_another_model_stands_next_to_this_one_and_is_first_outside_its_interval
     silent = ModelOpinion(trained_on="oval eyes", reasons=("it is unfamiliar",))
     table = report_table(found, model, graded(), other=silent)
     assert (table["other_model"]["agrees"], table["disagreements"]) == (None, [])
-    assert "Other       it is unfamiliar, by the model of oval eyes" in report_text(table)
+    assert "Other       no estimate by the model of oval eyes: it is unfamiliar" in report_text(
+        table
+    )
+
+
+def test_advice_and_exit_follow_a_larger_estimate_of_another_grade(model):
+    """The caution says to rely on the larger one: neither advice nor alarm may follow the other."""
+    found = recording_of(2.5e-4)
+    worse = ModelOpinion(
+        trained_on="oval eyes", severity=3.4e-4, low=3.1e-4, high=4e-4, grade=3, grade_name="bad"
+    )
+    table = report_table(found, model, graded(), other=worse)
+    assert table["other_model"]["relied_on"]
+    assert table["advice"]["action"] == "stop"
+    assert table["advice"]["sentence"].startswith("The larger estimate is beyond the condemning")
+    assert "(grade 3: bad), by the model of oval eyes" in " ".join(report_text(table).split())
+    assert "Grade 2" in table["headline"]  # the verdict remains that of this model
+
+    for quiet in (
+        dataclasses.replace(worse, severity=2.6e-4),  # within the interval: they agree
+        dataclasses.replace(worse, severity=1e-4, grade=0),  # smaller
+        dataclasses.replace(worse, severity=3.4e-4, grade=2),  # of the same grade
+    ):
+        same = report_table(found, model, graded(), other=quiet)
+        assert not same["other_model"]["relied_on"]
+        assert "larger" not in same["advice"]["sentence"]
+    careful = dataclasses.replace(worse, cautions=("its noise floor is high",))
+    said = report_table(found, model, graded(), other=careful)["other_model"]["text"]
+    assert said.endswith("; its own caution: its noise floor is high")
+
+
+def test_an_alarm_of_the_other_model_is_one_of_the_command(model_file, tmp_path, monkeypatch):
+    worse = ModelOpinion(trained_on="oval eyes", severity=9e-4, low=8e-4, high=1e-3, grade=3)
+    monkeypatch.setattr(workflow_report, "_other_opinion", lambda *_: worse)
+    one = written(tmp_path / "one.h5", [1.4e-4])
+    args = ("report", one, "--model", model_file, "--fail-on", "alarm")
+    assert "Grade 1 of 3" in run(*args).output
+    assert "Grade 1 of 3" in run(*args, "--also", "other.wsm", code=4).output
+
+
+def test_what_the_other_model_was_trained_on_is_no_longer_unseen(model):
+    """Only if it gives an estimate."""
+    trained = {"scene": "bilge-pump", "recipe": "bilge-pump-standard"}
+    card = model.card.model_copy(
+        update={"trained_on": model.card.trained_on.model_copy(update=trained)}
+    )
+    blind = dataclasses.replace(model, card=card)
+    other = ModelOpinion(trained_on="bilge-pump-oval", severity=2.6e-4, low=2e-4, high=3e-4)
+
+    def unseen(other):
+        return " ".join(report_table(recording_of(2.5e-4), blind, graded(), other=other)["unseen"])
+
+    assert "--also" in unseen(None)
+    assert "--also" in unseen(dataclasses.replace(other, severity=None, low=None, high=None))
+    assert "--also" not in unseen(other)
+    assert "main bearings" in unseen(other)
+
+
+def test_a_report_names_the_conditions_that_its_estimate_uses(model):
+    """A scene given for its geometry also gives pressures: whoever relies on them must see them."""
+    found = recording_of(2.5e-4)
+    used = graded(noted=("discharge_pressure_pa", "suction_pressure_pa"))
+
+    def told(row, **values):
+        plate = nameplate_of(None, "bilge-pump", values)
+        table = report_table(dataclasses.replace(found, row=row), model, used, plate=plate)
+        return table, [each["text"] for each in table["conditions"]]
+
+    table, texts = told({"discharge_pressure_pa": 2.8e5}, **{"pressure.suction": "0 bar"})
+    assert texts == [
+        "pressure.discharge = 280 kPa (noted with the recording)",
+        "pressure.suction = 0 Pa (set)",
+    ]
+    assert "Given       pressure.discharge = 280 kPa (noted" in report_text(table)
+    assert "Condition used: pressure.suction = 0 Pa (set)" in shown(
+        report_html(table, found, model)
+    )
+    assert told({})[1] == [
+        "pressure.discharge = 300 kPa (bilge-pump)",
+        "pressure.suction = -30 kPa (bilge-pump)",
+    ]
+    assert report_table(found, model, graded())["conditions"] == []
 
 
 def test_another_model_is_named_to_the_command(model_file, tmp_path):
     one, two = written(tmp_path / "one.h5", [2.5e-4]), written(tmp_path / "two.h5", [1e-4, 2e-4])
-    also = ("--model", model_file, "--also", model_file)
+    other = load_model(model_file)
+    trained = other.card.trained_on.model_copy(update={"recipe": "another"})
+    other = dataclasses.replace(other, card=other.card.model_copy(update={"trained_on": trained}))
+    save_model(other, tmp_path / "other.wsm")
+    also = ("--model", model_file, "--also", tmp_path / "other.wsm")
     told = json.loads(run("report", one, *also, "--json").output)
     own = told["estimate"]
     assert told["other_model"]["severity"] == own["severity"]
-    assert told["other_model"]["origin"] == told["provenance"]["model"]
+    assert told["other_model"]["grade"] == own["grade"]
+    origins = told["other_model"]["origin"], told["provenance"]["model"]
+    assert origins[0].keys() == origins[1].keys()
+    assert {name for name, value in origins[0].items() if value != origins[1][name]} == {
+        "file_sha256",
+        "recipe",
+    }
     assert told["other_model"]["agrees"]
+    same = run("report", one, "--model", model_file, "--also", model_file, code=2).output
+    assert "also: it is the same model of" in same
     many = run("report", two, *also, code=2).output
     assert "--also is for one recording: name one, or choose a --record" in many
     other = load_model(model_file)
@@ -527,6 +621,18 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     assert "must be a data set (.h5); make one of the healthy recordings" in said
     said = run(*args, "--baseline", worn, code=2).stderr
     assert "1 of 1 recordings have a grade above 0, must be of a healthy machine" in said
+
+
+def test_another_model_uses_the_healthy_recordings_as_well(referenced, model_file, tmp_path):
+    """A referenced second model is not told to ask for what was given."""
+    second, healthy = referenced
+    worn = written(tmp_path / "worn.h5", [2.5e-4], groups=[7], seed=3)
+    args = ("report", worn, "--model", model_file, "--also", second, "--record", 0, "--json")
+    alone = json.loads(run(*args).stdout)["other_model"]
+    assert "give --baseline healthy.h5" in alone["text"]
+    other = json.loads(run(*args, "--baseline", healthy).stdout)["other_model"]
+    assert other["reasons"] == []
+    assert other["severity"] == pytest.approx(2.5e-4, rel=0.15)  # as above
 
 
 def test_each_machine_of_a_batch_has_its_own_baseline(referenced, tmp_path):

@@ -273,7 +273,9 @@ def _report_one(task: _ReportTask) -> list[_Verdict]:
         table["html"] = str(task.output)
         text += f"\nPage        {task.output}"
     click.echo(json_text(table) if task.as_json else text)
-    return [(table["estimate"]["verdict"], found.estimate.grade)]
+    other = table["other_model"]
+    relied_on = other["grade"] if other and other["relied_on"] else found.estimate.grade
+    return [(table["estimate"]["verdict"], relied_on)]
 
 
 def _opinion(task: _ReportTask, heard: Any) -> Any:

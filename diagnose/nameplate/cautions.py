@@ -74,15 +74,24 @@ def _gap_cautions(
     ]
 
 
-def unseen_texts(card: ModelCard) -> list[str]:
+def unseen_texts(card: ModelCard, also_drawn: str = "") -> list[str]:
     """Effects that mislead a model without a warning: its built-in recipe does not vary them.
 
-    Empty for other recipes, whose variation is unknown.
+    Parameters
+    ----------
+    card : ModelCard
+    also_drawn : str
+        Recipe of a second model of the same recording: what it varies is no longer unseen.
+
+    Returns
+    -------
+    list of str
+        Empty for recipes that are not built in, whose variation is unknown.
     """
     trained = card.trained_on
     if trained.recipe not in recipe_names() or trained.scene not in scene_names():
         return []
-    drawn = _drawn_by(trained.recipe)
+    drawn = {*_drawn_by(trained.recipe), *_drawn_by(also_drawn)}
     shown = {kind.name for kind in card.strangers}
     return [
         each.text

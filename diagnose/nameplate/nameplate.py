@@ -237,6 +237,34 @@ def day_of(plate: Nameplate | None, row: Mapping[str, Any]) -> Mapping[str, Any]
     return row if plate is None else plate.conditions(row)
 
 
+def condition_origin(plate: Nameplate | None, row: Mapping[str, Any], column: str) -> str:
+    """Where the value of a known condition comes from, in words.
+
+    Parameters
+    ----------
+    plate : Nameplate or None
+    row : mapping
+        Conditions noted with the recording.
+    column : str
+        Key of :data:`~.feature_rows.noted.NOTED`.
+
+    Examples
+    --------
+    >>> plate = nameplate_of(None, "journal-bearing", {"load.static": "4 kN"})
+    >>> [condition_origin(plate, {}, each) for each in ("static_load_n", "viscosity_pa_s")]
+    ['set', 'journal-bearing']
+    >>> condition_origin(plate, {"viscosity_pa_s": 0.03}, "viscosity_pa_s")
+    'noted with the recording'
+    """
+    places = () if plate is None else plate.scene.condition_places
+    path = next((each.path for each in places if each.column == column), "")
+    if plate is not None and path and plate.is_set(path):
+        return "set"
+    if isinstance(row.get(column), float | int) and math.isfinite(row[column]):
+        return "noted with the recording"
+    return "" if plate is None else plate.source
+
+
 def _head_of(source: Path) -> Attributes | None:
     """Attributes of a data set that holds a scene; else None."""
     if source.suffix.lower() not in (".h5", ".hdf5"):

@@ -166,6 +166,27 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
 }
 """Grade and confidence -> what to do. Grade 0 cannot be better, grade 3 cannot be worse."""
 
+_LARGER: dict[int, _Rule] = {
+    1: _Rule(
+        action="confirm",
+        sentence="The larger estimate is of a worn machine: record again, and measure at the next "
+        "stop if it stays so.",
+        days=14,
+    ),
+    2: _Rule(
+        action="confirm",
+        sentence="By the larger estimate {work} is to be planned: measure before it is ordered.",
+        days=7,
+    ),
+    3: _Rule(
+        action="stop",
+        sentence="The larger estimate is beyond the condemning limit: stop at the first safe "
+        "moment and measure before {work}.",
+        days=1,
+    ),
+}
+"""Grade of a larger second estimate that is relied on -> what to do."""
+
 _WORDS = {
     0: "now",
     1: "within a day",
@@ -274,7 +295,11 @@ def work_words(quantity: str) -> str:
 
 
 def advise(
-    estimate: Estimate, quantity: str, edges: Sequence[float], outlook: Outlook | None = None
+    estimate: Estimate,
+    quantity: str,
+    edges: Sequence[float],
+    outlook: Outlook | None = None,
+    larger: int | None = None,
 ) -> Advice:
     """What to do about an estimate, and how soon.
 
@@ -288,6 +313,8 @@ def advise(
     outlook : Outlook, optional
         Outlook of the machine's trend. The early end of the remaining life replaces the rule of
         thumb if it comes sooner.
+    larger : int, optional
+        Higher grade of a second estimate that is to be relied on.
 
     Returns
     -------
@@ -307,6 +334,9 @@ def advise(
     """
     rule = _RULES[estimate.grade, confidence_of(estimate, edges)]
     days = _days(rule, estimate, edges)
+    if larger is not None:
+        rule = _LARGER[larger]
+        days = min(each for each in (days, rule.days) if each is not None)
     plain = Advice(
         action=rule.action,
         sentence=rule.sentence.format(work=work_words(quantity)),

@@ -25,8 +25,14 @@ class ModelOpinion:
         Wear and its interval [m]; None without an estimate.
     coverage : float
         Nominal coverage of the interval.
+    grade : int or None
+        Grade of the wear, 0 to 3.
+    grade_name : str
+        In words; empty without a grade.
     reasons : tuple of str
         Why there is no estimate.
+    cautions : tuple of str
+        Cautions of this model that the other one does not have.
     origin : mapping
         Origin of the model, its file's hash included, for the record.
     """
@@ -36,7 +42,10 @@ class ModelOpinion:
     low: float | None = None
     high: float | None = None
     coverage: float = 0.9
+    grade: int | None = None
+    grade_name: str = ""
     reasons: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
     origin: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -162,10 +171,49 @@ def other_model_table(other: ModelOpinion | None, estimate: Estimate) -> dict[st
     """Estimate by another model, for JSON and pages; None without one."""
     if other is None:
         return None
-    words = "; ".join(other.reasons) if other.severity is None else length_words(other)
     agrees = None if None in (other.severity, estimate.severity) else _holds(estimate, other)
-    text = f"{words}, by the model of {other.trained_on}"
-    return {**asdict(other), "agrees": agrees, "text": text}
+    relied_on = relied_on_grade(estimate, other) is not None
+    return {
+        **asdict(other),
+        "agrees": agrees,
+        "relied_on": relied_on,
+        "text": _opinion_words(other),
+    }
+
+
+def _opinion_words(other: ModelOpinion) -> str:
+    """Estimate by another model with its own cautions, or why there is none."""
+    if other.severity is None:
+        return f"no estimate by the model of {other.trained_on}: {'; '.join(other.reasons)}"
+    named = f" (grade {other.grade}: {other.grade_name})" if other.grade is not None else ""
+    said = f"{length_words(other)}{named}, by the model of {other.trained_on}"
+    return f"{said}; its own caution: {'; '.join(other.cautions)}" if other.cautions else said
+
+
+def relied_on_grade(estimate: Estimate, other: ModelOpinion | None) -> int | None:
+    """Grade of another model where advice and alarms must follow it instead of this one.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    other : ModelOpinion or None
+
+    Returns
+    -------
+    int or None
+        None unless it is the higher grade of the two and the models disagree, so that the larger
+        estimate is to be relied on.
+
+    Examples
+    --------
+    >>> trained = Estimate(verdict="graded", grade=1, severity=1.9e-4, low=1.7e-4, high=2.2e-4)
+    >>> other = ModelOpinion(trained_on="oval eyes", severity=2.9e-4, grade=2)
+    >>> relied_on_grade(trained, other)
+    2
+    """
+    if other is None or other.grade is None or _holds(estimate, other):
+        return None
+    return other.grade if estimate.grade is not None and other.grade > estimate.grade else None
 
 
 def new_cautions(before: Estimate, after: Estimate) -> list[str]:

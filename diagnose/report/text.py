@@ -40,6 +40,7 @@ def report_text(table: Mapping[str, Any]) -> str:
         ]
         if table["grades_text"]:
             lines.append(("Possible", table["grades_text"]))
+    lines += [("Given", each["text"]) for each in table["conditions"]]
     if table["film"] is not None:
         lines.append(("Film", f"equilibrium: {table['film']['text']}"))
     if table["twin"] is not None:

@@ -12,14 +12,17 @@ from typing import Any
 from ... import __version__
 from ...features.signal import iso
 from ...sim.output.recording import DataError, Recording
+from ...sim.scene.load import all_condition_places
 from ..feature_rows.feature_choice import choice_in, words_of
 from ..feature_rows.feature_table import is_regime, regime_words
 from ..feature_rows.model_card import ModelCard
+from ..feature_rows.noted import NOTED
 from ..healthy_reference.healthy import Baseline
 from ..learning.grades import GRADE_NAMES
 from ..nameplate.cautions import unseen_texts
-from ..nameplate.nameplate import Nameplate
+from ..nameplate.nameplate import Nameplate, condition_origin, day_of
 from ..nameplate.sensors import corrected_recording, correction_words
+from ..pages.si_text import si_text
 from ..pages.words import quantity_name
 from ..pictures.view import View
 from ..twin.opinion import TwinOpinion
@@ -31,6 +34,7 @@ from .second_estimate import (
     ModelOpinion,
     new_cautions,
     other_model_table,
+    relied_on_grade,
     twin_table,
     with_other_model,
     with_twin,
@@ -100,12 +104,13 @@ def report_table(
     Returns
     -------
     dict
-        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (estimate by the
-        film equilibrium, None if there is none for this machine), ``twin`` (estimate by the twin,
-        or None), ``other_model`` (estimate by another model, or None), ``disagreements`` (of these
-        with the model), ``grades_text``, ``advice``, ``limits``, ``iso``, ``outlook``,
-        ``evidence_summary``, ``evidence``, ``baseline_note``, ``unseen`` (effects that mislead the
-        model without a warning), ``notice``, ``provenance``.
+        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``conditions`` (those that
+        the estimate uses, with their origin), ``film`` (estimate by the film equilibrium, None if
+        there is none for this machine), ``twin`` (estimate by the twin, or None), ``other_model``
+        (estimate by another model, or None), ``disagreements`` (of these with the model),
+        ``grades_text``, ``advice``, ``limits``, ``iso``, ``outlook``, ``evidence_summary``,
+        ``evidence``, ``baseline_note``, ``unseen`` (effects that mislead the model without a
+        warning), ``notice``, ``provenance``.
         Lengths in metres, speeds in revolutions per second.
 
     Raises
@@ -126,10 +131,19 @@ def report_table(
         "estimate": estimate.as_dict(),
         "film": film_table(film, plate, recording.row),
         "twin": twin_table(twin, trained),
+        "conditions": conditions_table(estimate, plate, recording.row),
         "other_model": other_model_table(other, trained),
         "disagreements": new_cautions(trained, estimate),
         "grades_text": possible_words(estimate, card.grade_edges_m),
-        "advice": asdict(advise(estimate, quantity, card.grade_edges_m, outlook)),
+        "advice": asdict(
+            advise(
+                estimate,
+                quantity,
+                card.grade_edges_m,
+                outlook,
+                larger=relied_on_grade(trained, other),
+            )
+        ),
         "limits": limits_table(card),
         # an absolute level: known sensor errors are removed even if healthy recordings share them
         "iso": iso_table(corrected_recording(recording, plate), machine),
@@ -142,7 +156,7 @@ def report_table(
             for name, value, healthy, moved in estimate.evidence
         ],
         "baseline_note": baseline_note(model, baseline),
-        "unseen": unseen_texts(card) if estimate.graded else [],
+        "unseen": unseen_texts(card, _also_drawn(other)) if estimate.graded else [],
         "notice": model.notice,
         "provenance": {
             "program": f"wearstate {__version__}",
@@ -156,6 +170,29 @@ def report_table(
             else {"source": baseline.source, "recordings": baseline.recordings},
         },
     }
+
+
+def conditions_table(
+    estimate: Estimate, plate: Nameplate | None, row: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Operating conditions that an estimate uses: path, column, value [SI], unit, origin, text."""
+    known, places = day_of(plate, row), all_condition_places()
+    return [
+        {
+            "path": (path := places[column].path),
+            "column": column,
+            "value": float(known[column]),
+            "unit": NOTED[column].unit,
+            "origin": (origin := condition_origin(plate, row, column)),
+            "text": f"{path} = {si_text(known[column], NOTED[column].unit)} ({origin})",
+        }
+        for column in estimate.noted
+    ]
+
+
+def _also_drawn(other: ModelOpinion | None) -> str:
+    """Recipe of another model whose estimate stands next to this one; empty if there is none."""
+    return "" if other is None or other.severity is None else other.trained_on
 
 
 def baseline_note(model: WearModel, baseline: Baseline | None) -> str:

@@ -255,11 +255,7 @@ def judged(
 ) -> Report:
     """Report on a recording with known machine data, all of it already read."""
     baseline = baselines.of(recording) if baselines else None
-    estimate = model.estimate(
-        corrected_recording(recording, plate, baseline),
-        baseline,
-        **recording_context(plate, recording, model.card, baseline),
-    )
+    estimate = _estimated(recording, model, baseline, plate)
     table = report_table(
         recording,
         model,
@@ -268,7 +264,9 @@ def judged(
         baseline=baseline,
         plate=plate,
         twin=twin,
-        other=None if also is None else _other_opinion(recording, model, also, plate),
+        other=None
+        if also is None
+        else _other_opinion(recording, model, estimate, also, plate, baselines),
         files=files,
     )
     return Report(
@@ -281,27 +279,48 @@ def judged(
     )
 
 
+def _estimated(
+    recording: Recording, model: WearModel, baseline: Baseline | None, plate: Nameplate | None
+) -> Estimate:
+    """Estimate of a model for a recording, with all that is known of the machine."""
+    return model.estimate(
+        corrected_recording(recording, plate, baseline),
+        baseline,
+        **recording_context(plate, recording, model.card, baseline),
+    )
+
+
 def _other_opinion(
-    recording: Recording, model: WearModel, also: WearModel | str | Path, plate: Nameplate | None
+    recording: Recording,
+    model: WearModel,
+    first: Estimate,
+    also: WearModel | str | Path,
+    plate: Nameplate | None,
+    baselines: Baselines | None,
 ) -> ModelOpinion:
     """Estimate of another model for a recording."""
     other = also if isinstance(also, WearModel) else load_model(also)
     wanted, found = model.card.severity, other.card.severity
     if found != wanted:
         raise DataError(f"also: its wear = {found} must be {wanted}, as of the model; name another")
-    estimate = other.estimate(
-        corrected_recording(recording, plate),
-        None,
-        **recording_context(plate, recording, other.card, None),
-    )
     trained = other.card.trained_on
+    if other.card == model.card:
+        raise DataError(
+            f"also: it is the same model of {trained.recipe or trained.scene}, must be another; "
+            "name one that was trained on other assumptions"
+        )
+    healthy = Baselines(baselines.source, other.card).of(recording) if baselines else None
+    estimate = _estimated(recording, other, healthy, plate)
     return ModelOpinion(
         trained_on=trained.recipe or trained.scene or "another training set",
         severity=estimate.severity,
         low=estimate.low,
         high=estimate.high,
         coverage=estimate.coverage,
+        grade=estimate.grade,
+        grade_name=estimate.grade_name,
         reasons=estimate.reasons,
+        cautions=tuple(each for each in estimate.cautions if each not in first.cautions),
         origin=model_table(other, None if isinstance(also, WearModel) else Path(also)),
     )
 
