@@ -375,6 +375,9 @@ def test_another_model_is_named_to_the_command(model_file, tmp_path):
         "recipe",
     }
     assert told["other_model"]["agrees"]
+    page = shown(wearstate.report(one, model_file, also=tmp_path / "other.wsm").html())
+    assert "second model" in page
+    assert told["other_model"]["origin"]["file_sha256"] in page
     same = run("report", one, "--model", model_file, "--also", model_file, code=2).output
     assert "also: it is the same model of" in same
     many = run("report", two, *also, code=2).output
