@@ -4,9 +4,18 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from wearstate.diagnose.feature_rows.model_card import TrainedCondition
-from wearstate.diagnose.feature_rows.noted import NOTED, doubted, given_of, noted_values, strayed
+from wearstate.diagnose.feature_rows.noted import (
+    NOTED,
+    doubted,
+    given_of,
+    noted_ranges,
+    noted_values,
+    partly_noted,
+    strayed,
+)
 from wearstate.diagnose.learning.experts import FEWEST_RECORDS
 from wearstate.diagnose.nameplate.nameplate import nameplate_of
 from wearstate.diagnose.wear_model.bundle import ModelError, load_bundle
@@ -84,6 +93,22 @@ def test_what_few_know_is_taken_as_usual_and_not_called_noted():
     found = noted_values(names, [{"viscosity_pa_s": 1.0}, {"film_warming_k": 0.0}])
     np.testing.assert_array_equal(found, [[0.0, usual], [np.nan, 0.0]])
     assert given_of(names, {"viscosity_pa_s": 1.0, "film_warming_k": float("nan")}) == (names[0],)
+
+
+def test_a_suction_that_some_records_lack_is_an_input_and_a_lacking_discharge_is_named():
+    """One empty cell must not drop what may be unknown, nor drop the rest without a word."""
+    gaps = pd.DataFrame(
+        {"suction_pressure_pa": [-3e4, np.nan, 0.0], "discharge_pressure_pa": [3e5, np.nan, 2e5]}
+    )
+    assert noted_ranges(gaps) == {"suction_pressure_pa": (-3e4, 0.0)}
+    assert [text.split(",")[0] for text in partly_noted(gaps)] == [
+        "discharge_pressure_pa is known in 2 of 3 records"
+    ]
+    whole = gaps.fillna(2.5e5)
+    assert set(noted_ranges(whole)) == set(gaps)
+    assert partly_noted(whole) == []
+    assert noted_ranges(gaps * np.nan) == {}
+    assert partly_noted(gaps * np.nan) == []
 
 
 def test_a_suction_of_zero_is_a_pressure_and_no_missing_number(tmp_path):

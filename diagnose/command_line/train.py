@@ -168,6 +168,7 @@ def train(
     from ..evaluation.evaluate import score
     from ..evaluation.text import features_text, refusal_lines, score_lines
     from ..feature_rows.feature_choice import choice_in, choices_of, costs_ms
+    from ..feature_rows.noted import partly_noted
     from ..healthy_reference.healthy import references
     from ..healthy_reference.transfer_reference import healthy_transfer
     from ..wear_model.file import save_model
@@ -221,6 +222,7 @@ def train(
     head = f"{output}: trained on {trained.records} records of {trained.draws} machine draws"
     costs = costs_ms(data, choices, healthy_transfer(healthy, choices))
     left_out = [f"  left out: {text}" for text in table.lacking_words]
+    left_out += [f"  not used: {text}" for text in partly_noted(table.manifest)]
     lines = [
         head,
         *left_out,

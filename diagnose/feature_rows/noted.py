@@ -170,6 +170,54 @@ def strayed(names: Sequence[str], values: Float, seed: int, reach: float) -> Flo
     return np.asarray(values + np.random.default_rng(seed).uniform(-1, 1, values.shape) * ends)
 
 
+def noted_ranges(manifest: pd.DataFrame) -> dict[str, tuple[float, float]]:
+    """Smallest and largest value of each condition that can be an input of a model.
+
+    Parameters
+    ----------
+    manifest : pandas.DataFrame
+
+    Returns
+    -------
+    dict
+        Conditions that vary and are noted in all records, or have a usual value for the others.
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"thrust_n": [1.0, 2.0], "viscosity_pa_s": [0.02, np.nan]})
+    >>> noted_ranges(table)
+    {'thrust_n': (1.0, 2.0)}
+    """
+    found = {}
+    for name, values in _noted_columns(manifest).items():
+        known = values[np.isfinite(values)]
+        enough = len(known) == len(values) or (NOTED[name].usual is not None and len(known))
+        if enough and np.ptp(known) > 0:
+            found[name] = (float(known.min()), float(known.max()))
+    return found
+
+
+def partly_noted(manifest: pd.DataFrame) -> list[str]:
+    """Sentences on conditions that are no inputs of a model because some records lack them.
+
+    Examples
+    --------
+    >>> partly_noted(pd.DataFrame({"viscosity_pa_s": [0.02, 0.03, np.nan]}))
+    ['viscosity_pa_s is known in 2 of 3 records, must be in all to be an input of the model']
+    """
+    usable = noted_ranges(manifest)
+    return [
+        f"{name} is known in {known} of {len(values)} records, must be in all to be an input of "
+        "the model"
+        for name, values in _noted_columns(manifest).items()
+        if name not in usable and 0 < (known := int(np.isfinite(values).sum())) < len(values)
+    ]
+
+
+def _noted_columns(manifest: pd.DataFrame) -> dict[str, Float]:
+    return {name: manifest[name].to_numpy(dtype=float) for name in NOTED if name in manifest}
+
+
 def notes_of(manifest: pd.DataFrame) -> list[dict[str, Any]]:
     """Manifest values of each record, by name."""
     rows = manifest.to_dict("records")

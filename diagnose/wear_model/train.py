@@ -41,7 +41,7 @@ from ..feature_rows.feature_table import (
     regimes_in,
 )
 from ..feature_rows.model_card import LayoutCard, ModelCard
-from ..feature_rows.noted import NOTED, notes_of
+from ..feature_rows.noted import NOTED, noted_ranges, notes_of
 from ..feature_rows.physical import physical_rows
 from ..healthy_reference.healthy import references, refuse_strangers
 from ..healthy_reference.transfer_reference import healthy_transfer
@@ -484,10 +484,8 @@ def _unit_in(name: str) -> str:
 def _noted(manifest: pd.DataFrame) -> list[dict[str, Any]]:
     """Conditions that vary and do not follow from the vibration, with their ranges."""
     return [
-        {"name": name, "feature": "", "unit": noted.unit}
-        | _range(manifest[name].to_numpy(dtype=float))
-        for name, noted in NOTED.items()
-        if name in manifest and np.ptp(manifest[name].to_numpy(dtype=float)) > 0
+        {"name": name, "feature": "", "unit": NOTED[name].unit, "low": low, "high": high}
+        for name, (low, high) in noted_ranges(manifest).items()
     ]
 
 
