@@ -109,6 +109,11 @@ def test_a_suction_that_some_records_lack_is_an_input_and_a_lacking_discharge_is
     assert partly_noted(whole) == []
     assert noted_ranges(gaps * np.nan) == {}
     assert partly_noted(gaps * np.nan) == []
+    constant = pd.DataFrame(
+        {"suction_pressure_pa": [-3e4, np.nan], "discharge_pressure_pa": [3e5, np.nan]}
+    )
+    assert noted_ranges(constant) == {}
+    assert partly_noted(constant) == []  # as nothing can be learnt from them
 
 
 def test_a_suction_of_zero_is_a_pressure_and_no_missing_number(tmp_path):

@@ -205,12 +205,12 @@ def partly_noted(manifest: pd.DataFrame) -> list[str]:
     >>> partly_noted(pd.DataFrame({"viscosity_pa_s": [0.02, 0.03, np.nan]}))
     ['viscosity_pa_s is known in 2 of 3 records, must be in all to be an input of the model']
     """
-    usable = noted_ranges(manifest)
     return [
-        f"{name} is known in {known} of {len(values)} records, must be in all to be an input of "
-        "the model"
+        f"{name} is known in {len(known)} of {len(values)} records, must be in all to be an input "
+        "of the model"
         for name, values in _noted_columns(manifest).items()
-        if name not in usable and 0 < (known := int(np.isfinite(values).sum())) < len(values)
+        if 0 < len(known := values[np.isfinite(values)]) < len(values)
+        if NOTED[name].usual is None and np.ptp(known) > 0
     ]
 
 
