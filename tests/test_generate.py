@@ -748,6 +748,22 @@ def test_records_of_a_batch_are_of_one_kind_but_for_what_is_left_and_each_comes_
     assert max(left.values()) < 8  # else a batch of that kind were full
 
 
+def test_records_that_do_not_fill_a_batch_of_their_kind_fill_lanes_with_neighbours():
+    """Records with and without chambers never share lanes: one batch at most holds both."""
+    recipe = load_recipe("bilge-pump-standard")
+    samples = list(sample_records(recipe, 160, seed=0))
+    batches = list(generation._batches(samples, 32))
+    assert sorted(job.index for batch in batches for job in batch) == list(range(160))
+    rest = [batch for batch in batches if len(batch) < 32]
+    assert [len(batch) for batch in rest[:-1]] == [16] * (len(rest) - 1)
+    mixed = [batch for batch in rest if len({alike(job.scene) for job in batch}) > 1]
+    assert len(mixed) < len(rest)
+    chambers = [{job.scene.pressure.rung == "chamber" for job in batch} for batch in mixed]
+    assert chambers.count({True, False}) <= 1
+    assert {True} in chambers
+    assert {False} in chambers
+
+
 def test_the_first_failures_are_those_of_the_first_records_whatever_ends_first():
     tally = generation._Tally(9, None)
     for index in (7, 3, 8, 1, 5):

@@ -44,6 +44,9 @@ _TOGETHER = 32
 """Largest batch of records: two per lane, all with the same number of steps; few enough for
 memory."""
 
+_REMAINDER = 16
+"""Largest batch of the records that do not fill a batch of their kind: one per lane."""
+
 _FEWEST = 5
 """Smallest batch that is worthwhile."""
 
@@ -390,8 +393,7 @@ def _limits(scene: Scene, severity: str) -> dict[str, Any]:
 def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
     """Number of records that a worker simulates in parallel; it affects only time and memory."""
     each = math.ceil(todo / jobs)
-    rounds = math.ceil(each / _TOGETHER)  # equal numbers of equal batches for all workers
-    return math.ceil(each / rounds) if simulates_together(scene) and each >= _FEWEST else 1
+    return min(_TOGETHER, each) if simulates_together(scene) and each >= _FEWEST else 1
 
 
 def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, ...]]:
@@ -403,8 +405,27 @@ def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, 
         same.append(RecordJob(each.index, each.seed, each.row, each.scene))
         if len(same) == size:
             yield tuple(waiting.pop(kind))
-    left = [job for _, same in sorted(waiting.items(), key=_name_of) for job in same]
-    yield from (tuple(left[first : first + size]) for first in range(0, len(left), size))
+    yield from _remaining_batches(waiting, min(size, _REMAINDER))
+
+
+def _remaining_batches(
+    waiting: dict[Hashable, list[RecordJob]], size: int
+) -> Iterator[tuple[RecordJob, ...]]:
+    """Batches of one kind as far as they are full, then of neighbouring kinds.
+
+    Their order is that of the keys, in which properties that cost most when mixed come first; the
+    most expensive kinds are first, so that workers end at about the same time.
+    """
+    left: list[RecordJob] = []
+    for _, same in sorted(waiting.items(), key=_name_of, reverse=True):
+        whole = len(same) // size * size
+        yield from _pieces(same[:whole], size)
+        left += same[whole:]
+    yield from _pieces(left, size)
+
+
+def _pieces(jobs: list[RecordJob], size: int) -> Iterator[tuple[RecordJob, ...]]:
+    return (tuple(jobs[first : first + size]) for first in range(0, len(jobs), size))
 
 
 def _name_of(waiting: tuple[Hashable, list[RecordJob]]) -> str:

@@ -77,13 +77,16 @@ Float = NDArray[np.float64]
 
 
 class LaneKind(NamedTuple):
-    """Properties of lanes that run together, in addition to play in their crank pins."""
+    """Properties of lanes that run together, in addition to play in their crank pins.
 
-    wrist: bool  # play in wrist pins
-    guide: bool  # play in guides
+    Those that cost most when mixed come first.
+    """
+
     chambers: bool  # chambers with valves
     throws: int  # per record, in adjacent lanes
     oil: int  # models of the crank pins' eyes, see ``MAPPED_FILM``
+    guide: bool  # play in guides
+    wrist: bool  # play in wrist pins
     yields: bool  # casings that carry their bearings along
 
     @property
@@ -126,11 +129,11 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
     if not known or len(oils) > 1:
         return None
     return LaneKind(
-        wrist=JOINT_COMPLIANT in wristpins,
-        guide=JOINT_COMPLIANT in guides,
         chambers="chamber" in rungs,
         throws=len(throws),
         oil=oils.pop(),
+        guide=JOINT_COMPLIANT in guides,
+        wrist=JOINT_COMPLIANT in wristpins,
         yields=yields,
     )
 

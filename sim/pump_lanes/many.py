@@ -78,15 +78,16 @@ def simulate_pumps(
         yield from _together(group, kind, known)
 
 
-def pumps_alike(scene: Scene) -> tuple[LaneKind, int] | None:
+def pumps_alike(scene: Scene) -> tuple[bool, int, LaneKind] | None:
     """Properties that records best run together share; None for a scene that runs alone.
 
-    These are the kind of lane and the steps per sample: a lane that ends early stays empty.
+    What costs most when mixed comes first: records with and without chambers never share lanes, and
+    a lane that ends early, because its record has fewer steps per sample, stays empty.
     """
     pump = cast(PumpScene, scene)
     kind = _kind_of(pump)
     try:
-        return None if kind is None else (kind, planned(pump).factor)
+        return None if kind is None else (kind.chambers, planned(pump).factor, kind)
     except SceneError:  # reported when it is simulated
         return None
 
