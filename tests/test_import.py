@@ -307,6 +307,29 @@ def test_decimal_commas_and_other_separators(files, tmp_path):
         assert known.columns == {"scar_depth_bearing_m": (0.00025,), "n": (1.5,)}
 
 
+def test_pressures_that_no_pump_has_are_refused_with_their_lines(tmp_path):
+    """A model would use them as noted: 3 Pa for 3 bar, a vacuum below nothing, sides swapped."""
+    text = (
+        "file,discharge_pressure [bar],suction_pressure [bar]\n"
+        "a.wav,3,-0.3\nb.wav,-5,\nc.wav,-0.3,3\nd.wav,,\ne.wav,0,0\n"
+    )
+    with pytest.raises(DataError) as error:
+        read_labels(table(tmp_path / "l.csv", text))
+    first, second = str(error.value).splitlines()
+    assert "line 3: discharge_pressure_pa = -500000 must be > -101325; check value" in first
+    assert (
+        "line 4: discharge_pressure_pa = -30000 must be >= suction_pressure_pa = 300000" in second
+    )
+    both = {"discharge_pressure_pa": "1 bar", "suction_pressure_pa": "2 bar"}
+    with pytest.raises(DataError, match="label: discharge_pressure_pa = 100000 must be >= suct"):
+        read_labels(None, both)
+    rows = table(tmp_path / "m.csv", "file,discharge_pressure_pa\na.wav,3 bar\nb.wav,3\n")
+    with pytest.raises(DataError, match="line 3: discharge_pressure_pa = 3 must be >= suction"):
+        read_labels(rows, {"suction_pressure_pa": "0.2 bar"})
+    with pytest.raises(DataError, match=r"label: viscosity_pa_s = -0\.03 must be > 0"):
+        read_labels(None, {"viscosity_pa_s": "-30 mPa s"})
+
+
 def test_numbers_keep_their_group_names(files, tmp_path):
     text = "file,group\na.wav,12\nb.wav,7\nc.wav,12\n"
     known = read_labels(table(tmp_path / "l.csv", text))

@@ -8,6 +8,7 @@ from functools import partial
 from ...sim.parts.units import UNITS, to_si
 from ...sim.parts.wording import nearest
 from ...sim.scene.load import all_wear_places
+from ...sim.scene.pump_hydraulics import STANDARD_ATMOSPHERE
 from ..file.machines import FILE
 from .label_table import listed
 
@@ -194,6 +195,69 @@ def severities_in(
             worst = min(value for value in columns[name] if isinstance(value, float))
             faults.append(f"severity {name} = {worst:g} m must be >= 0; check the sign")
     return names
+
+
+_BOUND = {
+    "suction_pressure_pa": -STANDARD_ATMOSPHERE,
+    "discharge_pressure_pa": -STANDARD_ATMOSPHERE,
+    "viscosity_pa_s": 0.0,
+}
+"""Operating conditions and the bound that a value must exceed [SI]; pressures are gauge."""
+
+
+def condition_faults(columns: Mapping[str, Sequence[Value]], place: Place) -> list[str]:
+    """Sentences on operating conditions that no machine has, and which models would use.
+
+    Parameters
+    ----------
+    columns : mapping
+        Values of each row.
+    place : callable
+        Place of a row.
+
+    Examples
+    --------
+    >>> condition_faults({"viscosity_pa_s": [0.03, 0.0]}, lambda row: f"line {row + 2}")
+    ['line 3: viscosity_pa_s = 0 must be > 0; check value and unit']
+    """
+    return [
+        f"{place(row)}: {name} = {value:g} must be > {bound:g}; check value and unit"
+        for name, bound in _BOUND.items()
+        for row, value in enumerate(columns.get(name, ()))
+        if isinstance(value, float) and value <= bound
+    ]
+
+
+def pressure_faults(
+    columns: Mapping[str, Sequence[Value]], constants: Mapping[str, Sequence[Value]], place: Place
+) -> list[str]:
+    """Sentences on pumps that discharge at less than their suction pressure.
+
+    Parameters
+    ----------
+    columns : mapping
+        Values of each row.
+    constants : mapping
+        One value for all rows.
+    place : callable
+        Place of a row.
+
+    Examples
+    --------
+    >>> suction = {"suction_pressure_pa": [3e5]}
+    >>> found = pressure_faults({"discharge_pressure_pa": [4e5, 3.0]}, suction, "row {}".format)
+    >>> [each.partition(";")[0] for each in found]
+    ['row 1: discharge_pressure_pa = 3 must be >= suction_pressure_pa = 300000']
+    """
+    names = ("suction_pressure_pa", "discharge_pressure_pa")
+    rows = max(len(columns.get(name, ())) for name in names)
+    values = [columns.get(name) or list(constants.get(name, ())) * max(rows, 1) for name in names]
+    return [
+        f"{place(row) if rows else 'label'}: discharge_pressure_pa = {high:g} must be >= "
+        f"suction_pressure_pa = {low:g}; check values, units and signs of both gauge pressures"
+        for row, (low, high) in enumerate(zip(*values, strict=False))
+        if isinstance(low, float) and isinstance(high, float) and high < low
+    ]
 
 
 def known_severities(name: str) -> str:

@@ -12,7 +12,17 @@ from ...sim.output.recording import DataError
 from ...sim.parts.units import to_si
 from ...sim.scene.load import load_scene
 from ..recipe.severities import clearances, wear_limits
-from .label_columns import GRADE, GROUP, HIGHEST_GRADE, ROW, Value, columns_of, severities_in
+from .label_columns import (
+    GRADE,
+    GROUP,
+    HIGHEST_GRADE,
+    ROW,
+    Value,
+    columns_of,
+    condition_faults,
+    pressure_faults,
+    severities_in,
+)
 from .label_table import LabelTable, listed, read_label_table, refusal
 
 
@@ -248,6 +258,9 @@ def read_labels(
         for name in fixed
         if name in columns
     ]
+    faults += condition_faults(columns, table.place)
+    faults += condition_faults(fixed, lambda _: "label")
+    faults += pressure_faults(columns, fixed, table.place)
     found = severities_in({**columns, **fixed}, severities, faults)
     if faults:
         raise refusal(faults)
