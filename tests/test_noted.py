@@ -125,6 +125,24 @@ def test_a_suction_of_zero_is_a_pressure_and_no_missing_number(tmp_path):
     assert known == {"discharge_pressure_pa": 3e5, "suction_pressure_pa": 0.0}
 
 
+def test_a_pressure_that_a_scene_does_not_give_is_not_known(tmp_path):
+    """A nameplate may hold the geometry only; the default of 0 Pa moved a pump by a fifth."""
+    text = scene_text("bilge-pump")
+    scene = tmp_path / "mine.toml"
+
+    def known(without, **row):
+        scene.write_text(re.sub(rf"(?m)^({without}) = .*$", "", text), encoding="utf-8")
+        return nameplate_of(None, str(scene), {}).conditions(row)
+
+    assert known("discharge") == {"suction_pressure_pa": -3e4}
+    assert known("discharge|suction") == {}
+    assert known("discharge|suction", discharge_pressure_pa=2.8e5) == {
+        "discharge_pressure_pa": 2.8e5
+    }
+    given = nameplate_of(None, str(scene), {"pressure.discharge": "0 bar"})
+    assert given.conditions({}) == {"discharge_pressure_pa": 0.0}
+
+
 def test_half_of_the_training_records_lack_it_and_others_are_doubted_as_without_it():
     both = np.column_stack([np.zeros(4000), np.linspace(0, 15, 4000)])
     noted = doubted(["viscosity_pa_s", "film_warming_k"], both, seed=1)

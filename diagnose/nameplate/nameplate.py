@@ -105,7 +105,7 @@ class Nameplate:
         -------
         dict
             The row, completed by the columns of :data:`~.feature_rows.noted.NOTED` for which the
-            scene has a value.
+            scene was given a value.
 
         Examples
         --------
@@ -119,7 +119,7 @@ class Nameplate:
             column: condition_of(day, column)
             for column in NOTED
             if (place := places.get(column)) is not None and has_value(day, place)
-            if self.is_set(place) or not (self.assumed or _left_out(day, column))
+            if self.is_set(place) or not (self.assumed or _left_out(day, column, place))
         }
         return {**row, **known}
 
@@ -135,10 +135,19 @@ def _has_place(scene: Any, path: str) -> bool:
     return path != _WARMING or scene.oil.temperature is not None
 
 
-def _left_out(scene: Scene, column: str) -> bool:
-    """Whether the value in the scene only means that the rarely known number was not given."""
+def _left_out(scene: Scene, column: str, path: str) -> bool:
+    """Whether the value in the scene only means that the number was not given.
+
+    A default is no reading: a scene without ``pressure.discharge`` has 0 Pa, the pump has not.
+    """
     left_out = NOTED[column].left_out
-    return left_out is not None and condition_of(scene, column) == left_out
+    if left_out is not None and condition_of(scene, column) == left_out:
+        return True
+    above, _, name = path.rpartition(".")
+    part: Any = scene
+    for each in above.split("."):
+        part = part[int(each)] if each.isdigit() else getattr(part, each)
+    return name in type(part).model_fields and name not in part.model_fields_set
 
 
 def _replaced(scene: Any, path: str, value: float) -> Any:
