@@ -232,6 +232,16 @@ def test_what_is_not_known_is_a_caution_with_its_worth(model):
     np.testing.assert_allclose(both, [blind.severity, told.severity], rtol=1e-12)
 
 
+def test_a_condition_in_the_wrong_unit_is_named_with_its_cure(model):
+    asked, table = model
+    thick = asked.judge(table.values[0], conditions={"viscosity_pa_s": 20.0})  # mPa s
+    (said,) = [text for text in thick.cautions if text.startswith("viscosity_pa_s")]
+    assert said.startswith("viscosity_pa_s = 20 Pa s is outside the trained range 0.0")
+    assert said.endswith(
+        "check value and unit; if they are right, the estimate is an extrapolation"
+    )
+
+
 def test_an_informed_model_comes_back_from_its_file(model, tmp_path):
     asked, table = model
     save_model(asked, tmp_path / "a.wsm")
