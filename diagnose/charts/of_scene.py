@@ -24,7 +24,7 @@ from ...sim.fidelity.study import Search
 from ...sim.fidelity.written import default_step
 from ...sim.scene.scene import Scene
 from ..pages.kept import Kept
-from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of
+from .chart import RECOMMENDED, Chart, Choice, Point, RungCost, front_of
 from .decision import (
     KEPT,
     RAISED,
@@ -90,7 +90,6 @@ def scene_search(
     *,
     accuracy: float | None = None,
     jobs: int = 1,
-    clock: Clock = time.perf_counter,
     kept: Kept[Outcome] | None = None,
 ) -> Search:
     """Search over the rungs of a scene; nothing is measured yet.
@@ -103,8 +102,6 @@ def scene_search(
         Largest error of any quantity of interest; by default that of the scene.
     jobs : int
         Worker processes; the errors do not depend on it.
-    clock : callable
-        Time [s]; importable by name if there are workers.
     kept : Kept, optional
         Runs of an earlier search; new ones are added.
 
@@ -120,7 +117,7 @@ def scene_search(
         scene,
         known.quantities,
         truth=known.truth,
-        clock=clock,
+        clock=time.perf_counter,
         kept=kept,
         spread=partial(in_order, jobs=jobs),
         at_once=jobs,
@@ -131,9 +128,7 @@ def scene_search(
     return search
 
 
-def measure(
-    search: Search, *, budget: float | None = None, clock: Clock = time.perf_counter
-) -> None:
+def measure(search: Search, *, budget: float | None = None) -> None:
     """Let a search measure within a time budget.
 
     Parameters
@@ -141,12 +136,10 @@ def measure(
     search : Search
     budget : float, optional
         Time [s]; the first answer is measured in any case.
-    clock : callable
-        Time [s].
     """
-    end = math.inf if budget is None else clock() + _SLACK * budget
+    end = math.inf if budget is None else time.perf_counter() + _SLACK * budget
     with threadpool_limits(1):  # as in a worker: the same sums in the same order
-        search.measure(lambda expected: clock() + expected > end)
+        search.measure(lambda expected: time.perf_counter() + expected > end)
 
 
 def scene_chart(
