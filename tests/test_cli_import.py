@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 
 import numpy as np
 import pytest
@@ -146,6 +147,18 @@ def test_contents_are_listed(wavs, tmp_path):
     assert [len(item["recordings"]) for item in found] == [1, 2]
     assert found[1]["recordings"][0]["duration_s"] == 2.0
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".npz", ".wav", ".wav"]
+
+
+def test_a_faulty_file_does_not_hide_the_contents_of_others(wavs, tmp_path):
+    cut = tmp_path / "cut.wav"
+    cut.write_bytes(wavs[0].read_bytes()[:30])
+    text = run("import", "--list", cut, wavs[0]).stdout
+    assert re.match(rf"{re.escape(str(cut))}\n  \S.*\n{re.escape(str(wavs[0]))}\n  recording", text)
+    found = strict("import", "--list", cut, wavs[0])["files"]
+    assert [bool(item["fault"]) for item in found] == [True, False]
+    alone = run("import", "--list", cut, code=2)
+    assert found[0]["fault"].splitlines()[0] in alone.stderr
+    assert alone.stdout == ""
 
 
 def test_measured_contents(realdata):

@@ -153,8 +153,13 @@ def test_contents_are_listed_without_choosing(tmp_path, mat):
     ]
     assert "unit must be given" in " ".join(two["recordings"][0]["undeclared"])
     (tmp_path / "cut.mat").write_bytes(mat.read_bytes()[:150])
+    absent, there, cut = list_contents([tmp_path / "no.wav", mat, tmp_path / "cut.mat"])
+    assert absent == {"file": str(tmp_path / "no.wav"), "recordings": [], "fault": absent["fault"]}
+    assert absent["fault"].startswith("no such file")
+    assert there == known
+    assert cut["fault"]
     with pytest.raises(DataError) as caught:
-        list_contents([tmp_path / "no.wav", mat, tmp_path / "cut.mat"])
+        list_contents([tmp_path / "no.wav", tmp_path / "cut.mat"])
     assert "no.wav: no such file" in str(caught.value)
     assert "cut.mat" in str(caught.value)
 

@@ -209,12 +209,13 @@ def list_contents(
     -------
     list of dict
         One entry per file: ``file``, ``recordings`` (each with ``variable``, ``channels``,
-        ``sample_rate_hz``, ``samples``, ``duration_s``, ``conditions``, ``undeclared``).
+        ``sample_rate_hz``, ``samples``, ``duration_s``, ``conditions``, ``undeclared``), ``fault``
+        (why it cannot be read, or empty).
 
     Raises
     ------
     DataError
-        If files cannot be read; all at once.
+        If no file can be read; the faults of all at once.
 
     Examples
     --------
@@ -227,15 +228,18 @@ def list_contents(
     """
     found, faults = [], []
     for file in files:
+        parts: Sequence[Source] = ()
+        fault = ""
         try:
             parts = list_sources(file, options)
         except DataError as error:
             faults += str(error).split("\n")
-            continue
-        found.append({"file": str(file), "recordings": [_described(part) for part in parts]})
+            fault = str(error).replace(f"{file}: ", "")  # the entry has its name
+        described = [_described(part) for part in parts]
+        found.append({"file": str(file), "recordings": described, "fault": fault})
         for part in parts:
             part.close()
-    if faults:
+    if found and all(each["fault"] for each in found):
         raise refusal(faults)
     return found
 

@@ -109,7 +109,8 @@ def contents_text(found: Sequence[Mapping[str, Any]]) -> str:
     for item in found:
         lines.append(item["file"])
         lines += [line for part in item["recordings"] for line in _part_lines(part)]
-        if not item["recordings"]:
+        lines += [f"  {line}" for line in item["fault"].splitlines()]
+        if not item["recordings"] and not item["fault"]:
             lines.append("  no array that can be a recording")
     return "\n".join(lines)
 
