@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from wearstate.sim.hydraulics.liquid import specific_volume
+from wearstate.sim.hydraulics.liquid import air_volume, mixture_volume
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.output.status import Status
@@ -382,10 +382,13 @@ def test_a_cylinder_that_breathes_through_its_line_alone():
         top = scene.crank.radius + scene.rod.length
         return pressure.dead_volume + face * (top - x), -face * rate
 
+    def specific(pressure):
+        return mixture_volume(pressure, air_volume(pressure, h), h)[0]
+
     def rates(time, y):
         mass, node, flow = y
         room, _ = volume(time)
-        p = brentq(lambda q: specific_volume(q, h)[0] * mass - room, -1.01e5, 1e9, xtol=1e-6)
+        p = brentq(lambda q: specific(q) * mass - room, -1.01e5, 1e9, xtol=1e-6)
         drop = p - node
         out = open_by * drop / math.sqrt(abs(drop) + 1.0)
         n, absolute = 1.4, node + STANDARD_ATMOSPHERE
@@ -399,7 +402,7 @@ def test_a_cylinder_that_breathes_through_its_line_alone():
     begin = run.chambers[0, 0, 0]
     mean = 2 * face * scene.crank.radius * scene.drive.speed
     lines = lines_of(scene, STEP)
-    y0 = [volume(0.0)[0] / specific_volume(begin, h)[0], lines.states["mean"][1], -mean]
+    y0 = [volume(0.0)[0] / specific(begin), lines.states["mean"][1], -mean]
     end = 8192 * STEP
     found = solve_ivp(
         rates,

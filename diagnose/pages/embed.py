@@ -38,6 +38,42 @@ def bokeh_script() -> str:
     return str(Resources(mode="inline", components=["bokeh"]).render_js())
 
 
+def plain_figure(title: str, x_name: str, y_name: str, *, tools: Any, **ways: Any) -> Any:
+    """A figure with plain labels, as wide as the page, with its tools above.
+
+    Parameters
+    ----------
+    title, x_name, y_name : str
+        Shown to the letter.
+    tools : tuple of bokeh.models.Tool
+        The first is the one to drag with, the second the one to scroll with; panning and reset
+        follow them, and then the others.
+    **ways
+        As for :func:`bokeh.plotting.figure`.
+    """
+    from bokeh.models import PanTool, PlainText, ResetTool
+    from bokeh.models.annotations.labels import Title
+    from bokeh.plotting import figure
+
+    zoom, wheel, *others = tools
+    plot = figure(
+        # plain: a name between dollar signs is not a formula, which would need the network
+        title=Title(text=PlainText(text=title)),
+        x_axis_label=PlainText(text=x_name),
+        y_axis_label=PlainText(text=y_name),
+        sizing_mode="stretch_width",
+        toolbar_location="above",
+        min_border_right=18,  # half of the last number
+        toolbar_sticky=False,  # in a separate row: next to a long title a phone would show no tools
+        tools=[zoom, wheel, PanTool(), ResetTool(), *others],
+        active_drag=zoom,
+        active_scroll=wheel,
+        **ways,
+    )
+    plot.toolbar.logo = None
+    return plot
+
+
 def item_text(figure: Any) -> str:
     """A figure as JSON that can be placed in a script element of a page.
 

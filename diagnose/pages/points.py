@@ -10,7 +10,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from ...sim.output.recording import DataError
-from .embed import MOST_BYTES, SPARE_BYTES, bokeh_script, item_text, require_bokeh
+from .embed import (
+    MOST_BYTES,
+    SPARE_BYTES,
+    bokeh_script,
+    item_text,
+    plain_figure,
+    require_bokeh,
+)
 from .page import visible
 
 _HEIGHT = 430  # [px]
@@ -213,37 +220,18 @@ def _column(panels: Sequence[PointAxes]) -> Any:
 
 
 def _axes(panel: PointAxes) -> Any:
-    from bokeh.models import (
-        BoxZoomTool,
-        HoverTool,
-        PanTool,
-        PlainText,
-        ResetTool,
-        TapTool,
-        WheelZoomTool,
-    )
-    from bokeh.models.annotations.labels import Title
-    from bokeh.plotting import figure
+    from bokeh.models import BoxZoomTool, HoverTool, TapTool, WheelZoomTool
 
-    wheel, zoom = WheelZoomTool(modifiers="ctrl"), BoxZoomTool()
-    plot = figure(
-        # plain: a name between dollar signs is not a formula, which would need the network
-        title=Title(text=PlainText(text=visible(panel.title))),
-        x_axis_label=PlainText(text=visible(panel.x_name)),
-        y_axis_label=PlainText(text=visible(panel.y_name)),
+    plot = plain_figure(
+        visible(panel.title),
+        visible(panel.x_name),
+        visible(panel.y_name),
         x_axis_type=panel.x_kind,
         y_axis_type=panel.y_kind,
         height=_HEIGHT,
-        sizing_mode="stretch_width",
-        toolbar_location="above",
-        min_border_right=18,  # half of the last number
-        toolbar_sticky=False,  # in a separate row: next to a long title a phone would show no tools
-        tools=[zoom, wheel, PanTool(), ResetTool(), TapTool()],
-        active_drag=zoom,
-        active_scroll=wheel,
+        tools=(BoxZoomTool(), WheelZoomTool(modifiers="ctrl"), TapTool()),
     )
     plot.add_tools(HoverTool(mode="mouse", tooltips=_HOVER, renderers=[]))
-    plot.toolbar.logo = None
     if panel.x_kind == "datetime":
         across: Any = plot.x_range
         across.default_span = _DATE_SPAN  # around a single date; Bokeh's own is 2 ms

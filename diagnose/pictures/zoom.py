@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..pages.embed import MOST_BYTES, SPARE_BYTES, bokeh_script, item_text, require_bokeh
+from ..pages.embed import (
+    MOST_BYTES,
+    SPARE_BYTES,
+    bokeh_script,
+    item_text,
+    plain_figure,
+    require_bokeh,
+)
 from ..pages.page import render, visible
 from ..pages.picture import PageImage
 from .panel import COLOURS
@@ -223,40 +230,27 @@ def _figure(curve: ZoomCurve, x_range: Any, across: Any, colour: str) -> Any:
         BoxZoomTool,
         ColumnDataSource,
         CrosshairTool,
-        PanTool,
-        PlainText,
         Range1d,
-        ResetTool,
         WheelZoomTool,
     )
     from bokeh.models.annotations.geometry import Span
-    from bokeh.models.annotations.labels import Title
-    from bokeh.plotting import figure
 
     around = curve.kind == "orbit"
     low, high = _extent(curve.y, _MARGIN)
     along = Span(dimension="width", line_dash="dotted", line_color="#49535e")
     wheel = WheelZoomTool(dimensions="both" if around else "width", modifiers="ctrl")
     zoom = BoxZoomTool(dimensions="both" if around else "auto", match_aspect=around)
-    plot = figure(
-        # plain: a name between dollar signs is not a formula, which would need the network
-        title=Title(text=PlainText(text=curve.title)),
-        x_axis_label=PlainText(text=curve.x_name),
-        y_axis_label=PlainText(text=curve.y_name),
+    plot = plain_figure(
+        curve.title,
+        curve.x_name,
+        curve.y_name,
         x_range=x_range,
         y_range=Range1d(start=low if curve.hz is None else 0.0, end=high),
         height=_ORBIT_HEIGHT if around else _HEIGHT,
         match_aspect=around,
-        sizing_mode="stretch_width",
-        toolbar_location="above",
-        min_border_right=18,  # half of the last number
-        toolbar_sticky=False,  # in a separate row: next to a long title a phone would show no tools
-        tools=[zoom, wheel, PanTool(), ResetTool(), CrosshairTool(overlay=(across, along))],
-        active_drag=zoom,
-        active_scroll=wheel,
+        tools=(zoom, wheel, CrosshairTool(overlay=(across, along))),
         tags=[curve.hz, curve.reach, visible(curve.title), curve.unit],
     )
-    plot.toolbar.logo = None
     points = ColumnDataSource(
         {"x": np.asarray(curve.x, dtype=np.float32), "y": np.asarray(curve.y, dtype=np.float32)}
     )

@@ -76,7 +76,6 @@ def second_opinion(
     *,
     wear: str | None = None,
     seed: int = 0,
-    jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> TwinOpinion:
     """Estimate the wear of a recording by the twin of its machine.
@@ -91,8 +90,6 @@ def second_opinion(
         Manifest column of the requested wear, checked against that of the twin.
     seed : int
         Seed of draws and sensor noise, >= 0.
-    jobs : int
-        Worker processes; the result does not depend on them.
     progress : callable, optional
         Called with (machines simulated, all).
 
@@ -129,7 +126,6 @@ def second_opinion(
         rounds=OPINION_ROUNDS,
         wider=OPINION_WIDENED,
         seed=seed,
-        jobs=jobs,
         progress=progress,
         check=lambda rows: seen.append(misfit(layout, rows, observed)),
     )

@@ -16,10 +16,9 @@ from ..rotation.orbit import PROBE_ANGLES, displacement, keyphasor_marks
 from ..rotation.order import pulse_times
 from ..signal.envelope import Band, Kind
 from ..signal.envelope import envelope_spectrum as envelope_lines
-from ..signal.rate import check_rate
 from ..signal.spectrum import amplitude_spectrum
 from .analysis import DISPLACEMENT, FORCE, Analysis
-from .row import Recorded
+from .row import Recorded, array_signals
 
 Float = NDArray[np.float64]
 Data = Recorded | ArrayLike | pd.DataFrame
@@ -479,24 +478,13 @@ def _read(
             f"data = '{data}' must be a recording, an array or a table; read a file with "
             "wearstate.read_recording"
         )
-    if fs is None:
-        raise ValueError("fs = None must be given with an array; give the sample rate in Hz")
-    check_rate(fs)
-    if isinstance(data, pd.DataFrame):
-        channel_names = channel_names or [str(name) for name in data.columns]
-        data = data.to_numpy().T
-    signals = np.atleast_2d(np.asarray(data))
-    names = tuple(channel_names or (f"ch_{i}" for i in range(len(signals))))
-    if len(names) != len(signals):
-        raise ValueError(
-            f"channel_names has {len(names)} names, must have {len(signals)}; name every channel"
-        )
+    signals, names, fs = array_signals(data, fs, channel_names)
     _refuse_gaps(signals, names)
     if tacho is not None:
         _refuse_gaps(np.atleast_2d(np.asarray(tacho)), ("tacho",))
     return _Given(
         signals=signals,
-        fs=float(fs),
+        fs=fs,
         names=names,
         units=("",) * len(names),
         quantities=("",) * len(names),

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
-from typing import Protocol, get_args, runtime_checkable
+from typing import Any, Protocol, get_args, runtime_checkable
 
 import numpy as np
 import pandas as pd
@@ -436,21 +436,14 @@ def feature_row(
             feature_set=feature_set,
             only=only,
         )
-    if fs is None:
-        raise ValueError("fs = None must be given with an array; give the sample rate in Hz")
-    check_rate(fs)
-    if isinstance(vibration, pd.DataFrame):
-        channel_names = channel_names or [str(name) for name in vibration.columns]
-        vibration = vibration.to_numpy().T
-    signals = np.atleast_2d(np.asarray(vibration))
+    signals, channels, fs = array_signals(vibration, fs, channel_names)
     if not np.issubdtype(signals.dtype, np.floating) or signals.dtype == np.float16:
         signals = signals.astype(np.float64)
-    channels = _channel_names(channel_names, len(signals))
     _check_vibration(signals, channels)
     layout = Layout(
         channels=channels,
         quantities=_quantities(quantities, len(signals)),
-        fs=float(fs),
+        fs=fs,
         tacho=tacho is not None,
         pulses_per_revolution=pulses_per_revolution,
         n_samples=signals.shape[-1],
@@ -516,14 +509,24 @@ def _values(plan: _Plan, analysis: Analysis) -> Float:
     return np.concatenate(parts, dtype=np.float64)
 
 
-def _channel_names(given: Sequence[str] | None, n_channels: int) -> tuple[str, ...]:
-    if given is None:
-        return tuple(f"ch_{i}" for i in range(n_channels))
-    if len(given) != n_channels:
+def array_signals(
+    data: ArrayLike | pd.DataFrame, fs: float | None, channel_names: Sequence[str] | None
+) -> tuple[NDArray[Any], tuple[str, ...], float]:
+    """Signals [shape=(n_channels, n_samples)] of an array or a table, their names and rate [Hz]."""
+    if fs is None:
+        raise ValueError("fs = None must be given with an array; give the sample rate in Hz")
+    check_rate(fs)
+    if isinstance(data, pd.DataFrame):
+        channel_names = channel_names or [str(name) for name in data.columns]
+        data = data.to_numpy().T
+    signals = np.atleast_2d(np.asarray(data))
+    numbered = (f"ch_{i}" for i in range(len(signals)))
+    names = tuple(numbered if channel_names is None else channel_names)
+    if len(names) != len(signals):
         raise ValueError(
-            f"channel_names has {len(given)} names, must have {n_channels}; name every channel"
+            f"channel_names has {len(names)} names, must have {len(signals)}; name every channel"
         )
-    return tuple(given)
+    return signals, names, float(fs)
 
 
 def _pulses(tacho: ArrayLike, fs: float, n_samples: int) -> Float:

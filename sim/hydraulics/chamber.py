@@ -440,7 +440,7 @@ def chamber_step(
     Notes
     -----
     The mass in the chamber is ``M = (V - V_vapour) / v(p)``, in volumes at atmospheric pressure,
-    see :func:`specific_volume`; ``V = V_dead + A (x_top - x)``. ::
+    see :func:`mixture_volume`; ``V = V_dead + A (x_top - x)``. ::
 
         M'  = Q_s - Q_d,                0 <= V_vapour  complementary to  p >= p_vapour
         Q   = (C_d pi D z + C_d A_leak) sqrt(2 dp / rho) + A_v z'

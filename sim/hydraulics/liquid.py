@@ -46,22 +46,14 @@ def _air_far(pressure: float, h: Any) -> float:
 
 @kernel
 def mixture_volume(pressure: float, air: float, h: Any) -> Any:
-    """Volume per volume at atmospheric pressure, and its derivative [1/Pa]."""
-    stiff, absolute = h.bulk_modulus + pressure, pressure + STANDARD_ATMOSPHERE
-    inverse = 1.0 / (stiff * absolute)  # one division for two
-    softness = inverse * absolute
-    liquid = (1.0 - h.air_fraction) * h.bulk_modulus * softness
-    return liquid + air, -liquid * softness - h.air_power * air * inverse * stiff
-
-
-@kernel
-def specific_volume(pressure: float, h: Any) -> Any:
     """Volume of liquid and air over their volume at atmospheric pressure, with its slope.
 
     Parameters
     ----------
     pressure : float
         Gauge pressure [Pa], above vacuum.
+    air : float
+        Volume of the air at this pressure, see :func:`air_volume` and :func:`air_near`.
     h : record of dtype HYDRAULIC
 
     Returns
@@ -89,8 +81,12 @@ def specific_volume(pressure: float, h: Any) -> Any:
     >>> h = hydraulic_parameters(
     ...     CylinderPressure(), area=1.0, crank_radius=0.05, rod_length=0.25, speed=0.0
     ... )[0]
-    >>> v, slope = specific_volume(0.0, h)
+    >>> v, slope = mixture_volume(0.0, air_volume(0.0, h), h)
     >>> round(v, 12), round(-v / slope / 1e6, 1)  # two per mille of air: a thirtieth of water's
     (1.0, 68.7)
     """
-    return mixture_volume(pressure, air_volume(pressure, h), h)
+    stiff, absolute = h.bulk_modulus + pressure, pressure + STANDARD_ATMOSPHERE
+    inverse = 1.0 / (stiff * absolute)  # one division for two
+    softness = inverse * absolute
+    liquid = (1.0 - h.air_fraction) * h.bulk_modulus * softness
+    return liquid + air, -liquid * softness - h.air_power * air * inverse * stiff

@@ -338,11 +338,9 @@ class Recording(SignalLayout):
 
     @property
     def _heading(self) -> str:
-        rate = self.sample_rate
-        rate_text = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
         name = f"{self.source} " if self.source else ""
         failed = "" if self.status.ok else f", {self.status}"
-        return f"{name}{self.duration:.4g} s, {rate_text}{failed}"
+        return f"{name}{extent_text(self.duration, self.sample_rate)}{failed}"
 
     def _repr_html_(self) -> str:
         """For notebooks: the channels with quantity, unit and rms about the mean."""
@@ -352,6 +350,19 @@ class Recording(SignalLayout):
         ]
         head = f"{self._heading}, {self.origin}"
         return html_table(head, ("channel", "quantity", "place", "rms about the mean"), cells)
+
+
+def extent_text(duration: float, sample_rate: float) -> str:
+    """Duration [s] and sample rate [Hz] of a recording, in words.
+
+    Examples
+    --------
+    >>> extent_text(1.0, 25600.0)
+    '1 s, 25.6 kHz'
+    """
+    thousand = sample_rate >= 1000
+    rate = f"{sample_rate / 1000:.6g} kHz" if thousand else f"{sample_rate:.6g} Hz"
+    return f"{duration:.4g} s, {rate}"
 
 
 def html_table(heading: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

@@ -6,7 +6,6 @@ the shaft rotates, so that Y lies a quarter of a turn ahead of X.
 
 import math
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -59,6 +58,7 @@ from .scene import (
     WearPlace,
     faults_between,
     name_faults,
+    refuse_disorder,
 )
 
 _UNBALANCE_MOST = 1e6  # kg m
@@ -387,17 +387,7 @@ class ScarLimits(Part):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        values = (self.as_new, *self.grade_edges)
-        if any(low >= high for low, high in pairwise(values)):
-            raise ValueError(
-                f"as_new and grade_edges = {', '.join(f'{v:g} m' for v in values)} must rise "
-                "strictly; reorder them"
-            )
-        if self.grade_edges[-1] != self.condemning:
-            raise ValueError(
-                f"grade_edges[2] = {self.grade_edges[-1]:g} m must equal condemning = "
-                f"{self.condemning:g} m; grade 3 is condemned"
-            )
+        refuse_disorder(self.as_new, self.grade_edges, self.condemning)
         return self
 
 

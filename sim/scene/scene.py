@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
 
 from ..brief import short
-from ..output.recording import html_table
+from ..output.recording import extent_text, html_table
 from ..output.sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel
 from ..parts.dimensions import Frequency, Length, Ratio, Time
 from ..parts.limits import LONGEST
@@ -54,17 +54,7 @@ class Wear(Part):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        values = (self.as_new_diametral, *self.grade_edges_diametral)
-        if any(low >= high for low, high in pairwise(values)):
-            raise ValueError(
-                "as_new_diametral and grade_edges_diametral = "
-                f"{', '.join(f'{v:g} m' for v in values)} must rise strictly; reorder them"
-            )
-        if self.grade_edges_diametral[-1] != self.condemning_diametral:
-            raise ValueError(
-                f"grade_edges_diametral[2] = {self.grade_edges_diametral[-1]:g} m must equal "
-                f"condemning_diametral = {self.condemning_diametral:g} m; grade 3 is condemned"
-            )
+        refuse_disorder(self.as_new, self.grade_edges, self.condemning, "_diametral")
         return self
 
     @property
@@ -81,6 +71,23 @@ class Wear(Part):
     def condemning(self) -> float:
         """Clearance above which the joint must be renewed [m]."""
         return self.condemning_diametral
+
+
+def refuse_disorder(
+    as_new: float, edges: tuple[float, ...], condemning: float, suffix: str = ""
+) -> None:
+    """Refuse limits [m] that do not rise; their names in the scene end in the suffix."""
+    values = (as_new, *edges)
+    if any(low >= high for low, high in pairwise(values)):
+        raise ValueError(
+            f"as_new{suffix} and grade_edges{suffix} = {', '.join(f'{v:g} m' for v in values)} "
+            "must rise strictly; reorder them"
+        )
+    if edges[-1] != condemning:
+        raise ValueError(
+            f"grade_edges{suffix}[2] = {edges[-1]:g} m must equal condemning{suffix} = "
+            f"{condemning:g} m; grade 3 is condemned"
+        )
 
 
 class Numerics(Part):
@@ -190,9 +197,8 @@ class Scene(Part):
 
     def __repr__(self) -> str:
         """Machine, name and extent of a recording."""
-        rate = self.sample_rate
-        rate_text = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
-        return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {rate_text}>"
+        extent = extent_text(self.duration, self.sample_rate)
+        return f"<{type(self).__name__} {self.name}, {extent}>"
 
     __str__ = __repr__
 

@@ -267,10 +267,6 @@ class LifeHistory:
         renewed = next((piece.born for piece in self.pieces if piece.born > time), math.nan)
         return (time - born) / (renewed - born)
 
-    def event_times(self) -> tuple[float, ...]:
-        """Times of maintenance and renewals [s]."""
-        return tuple(piece.begin for piece in self.pieces[1:])
-
     def _piece(self, time: float) -> _Piece:
         place = bisect_right(self.pieces, time, key=lambda piece: piece.begin) - 1
         return self.pieces[max(place, 0)]
