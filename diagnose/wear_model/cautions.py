@@ -135,9 +135,11 @@ def condition_cautions(card: ModelCard, row: Float, recorded: Mapping[str, Any])
         low, high = condition.low, condition.high
         if value is None or not math.isfinite(value) or low <= value <= high:
             continue
+        cure = "" if feature else "check value and unit; if they are right, "
         cautions.append(
             f"{name} = {f'{value:.4g} {condition.unit}'.rstrip()} is outside the trained range "
-            f"{f'{low:.4g} to {high:.4g} {condition.unit}'.rstrip()}: extrapolating"
+            f"{f'{low:.4g} to {high:.4g} {condition.unit}'.rstrip()}: {cure}the estimate is an "
+            "extrapolation"
         )
     return cautions
 
