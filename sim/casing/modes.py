@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..jit import kernel
+from ..jit import kernel, kernel_noalias
 from ..parts.casing import specific_key
 from .decimation import BLOCK, PIECE, Decimation, pieces, write_rows
 
@@ -69,46 +69,67 @@ def exact_oscillator(
     return transition, np.column_stack([np.array([step_q, step_v]) - slope, slope])
 
 
-@kernel
-def _read(row: Any, first: int, block: Any) -> None:
-    """Copy a block of forces with its neighbours."""
-    for i in range(BLOCK + 2 * _REACH):
-        block[i] = row[np.uint64(first + i)]  # unsigned: no index from the end
-
-
-@kernel
-def _raise(block: Any, taps: Any, raised: Any) -> None:
-    """Apply the symmetric taps to the forces."""
-    t0, t1, t2, t3 = taps[3], taps[4], taps[5], taps[6]
-    for i in range(BLOCK):
-        raised[i + _AHEAD] = (
-            t0 * block[i + 3]
-            + t1 * (block[i + 2] + block[i + 4])
-            + t2 * (block[i + 1] + block[i + 5])
-            + t3 * (block[i] + block[i + 6])
-        )
-
-
-@kernel
-def _add_direct(total: Any, a: float, block: Any, b: float, raised: Any) -> None:
-    for i in range(BLOCK):
-        total[i] += a * block[i + _REACH] + b * raised[i + _AHEAD]
-
-
-@kernel
-def _add_modal_twice(
-    total: Any, a: float, b: float, other: Any, c: float, d: float, real: Any, imaginary: Any
+@kernel_noalias
+def _feel(
+    row: Any,
+    first: int,
+    taps: Any,
+    raised: Any,
+    total: Any,
+    other: Any,
+    direct: Any,
+    raised_direct: Any,
 ) -> None:
+    """Apply the symmetric taps to a block of a force, and add its immediate effect at two outputs.
+
+    The block is preceded and followed by ``_REACH`` steps.
+    """
+    t0, t1, t2, t3 = taps[3], taps[4], taps[5], taps[6]
+    a, b, c, d = direct[0], raised_direct[0], direct[1], raised_direct[1]
+    for i in range(BLOCK):
+        k = np.uint64(first + i)  # unsigned: no index from the end
+        force = row[k + _THREE]
+        high = (
+            t0 * force
+            + t1 * (row[k + _TWO] + row[k + _FOUR])
+            + t2 * (row[k + _ONE] + row[k + _FIVE])
+            + t3 * (row[k] + row[k + _SIX])
+        )
+        raised[i + _AHEAD] = high
+        total[i] += a * force + b * high
+        other[i] += c * force + d * high
+
+
+_ONE, _TWO, _THREE, _FOUR, _FIVE, _SIX = (np.uint64(i) for i in range(1, 2 * _REACH + 1))
+
+
+@kernel_noalias
+def _add_direct(
+    row: Any,
+    first: int,
+    raised: Any,
+    total: Any,
+    other: Any,
+    direct: Any,
+    raised_direct: Any,
+) -> None:
+    """Add the immediate effect of a force at two more outputs."""
+    a, b, c, d = direct[0], raised_direct[0], direct[1], raised_direct[1]
+    for i in range(BLOCK):
+        force, high = row[np.uint64(first + i) + _THREE], raised[i + _AHEAD]
+        total[i] += a * force + b * high
+        other[i] += c * force + d * high
+
+
+@kernel_noalias
+def _add_modal(swing: Any, state: Any, total: Any, other: Any) -> None:
+    """Add the acceleration of a mode's springs and dashpots at two more outputs."""
+    a, b, c, d = swing[0].imag, swing[0].real, swing[1].imag, swing[1].real
+    real, imaginary = state[0], state[1]
     for i in range(BLOCK):
         x, y = real[i + _AHEAD], imaginary[i + _AHEAD]
         total[i] += a * x + b * y
         other[i] += c * x + d * y
-
-
-@kernel
-def _add_modal(total: Any, a: float, real: Any, b: float, imaginary: Any) -> None:
-    for i in range(BLOCK):
-        total[i] += a * real[i + _AHEAD] + b * imaginary[i + _AHEAD]
 
 
 @kernel
@@ -134,16 +155,59 @@ def _gather_four(force: Any, turn: Any, real: Any, imaginary: Any) -> None:
         imaginary[i] = b1 * force[i + 2] + b2 * force[i + 1] + b3 * force[i]
 
 
-@kernel
-def _turn_eight(real: Any, imaginary: Any, turn: Any, x: Any, y: Any) -> None:
-    """Advance every state by eight steps, from sums of four."""
+@kernel_noalias
+def _turn_two(
+    turn: Any,
+    swing: Any,
+    x: Any,
+    y: Any,
+    pushed: Any,
+    late: Any,
+    later_turn: Any,
+    later_swing: Any,
+    u: Any,
+    v: Any,
+    later_pushed: Any,
+    later_late: Any,
+    total: Any,
+    other: Any,
+) -> None:
+    """Advance all states of two modes by eight steps, and add their effect at two outputs.
+
+    A mode waits for its state eight steps before; two take the time of one.
+    """
     a4, b4, a8, b8 = turn[3].real, turn[3].imag, turn[4].real, turn[4].imag
+    c4, d4 = later_turn[3].real, later_turn[3].imag
+    c8, d8 = later_turn[4].real, later_turn[4].imag
+    a, b, c, d = swing[0].imag, swing[0].real, swing[1].imag, swing[1].real
+    e, f = later_swing[0].imag, later_swing[0].real
+    g, h = later_swing[1].imag, later_swing[1].real
     for i in range(BLOCK):
-        pushed_x = real[i + 4] + a4 * real[i] - b4 * imaginary[i]
-        pushed_y = imaginary[i + 4] + b4 * real[i] + a4 * imaginary[i]
+        pushed_x = pushed[i + 4] + a4 * pushed[i] - b4 * late[i]
+        pushed_y = late[i + 4] + b4 * pushed[i] + a4 * late[i]
         x_now, y_now = x[i], y[i]
-        x[i + _AHEAD] = a8 * x_now - b8 * y_now + pushed_x
-        y[i + _AHEAD] = b8 * x_now + a8 * y_now + pushed_y
+        x_then = a8 * x_now - b8 * y_now + pushed_x
+        y_then = b8 * x_now + a8 * y_now + pushed_y
+        x[i + _AHEAD], y[i + _AHEAD] = x_then, y_then
+        pushed_u = later_pushed[i + 4] + c4 * later_pushed[i] - d4 * later_late[i]
+        pushed_v = later_late[i + 4] + d4 * later_pushed[i] + c4 * later_late[i]
+        u_now, v_now = u[i], v[i]
+        u_then = c8 * u_now - d8 * v_now + pushed_u
+        v_then = d8 * u_now + c8 * v_now + pushed_v
+        u[i + _AHEAD], v[i + _AHEAD] = u_then, v_then
+        total[i] = (total[i] + (a * x_then + b * y_then)) + (e * u_then + f * v_then)
+        other[i] = (other[i] + (c * x_then + d * y_then)) + (g * u_then + h * v_then)
+
+
+@kernel
+def _push(raised: Any, inputs: Any, turn: Any, force: Any, sums: Any) -> float:
+    """Sum of the forces on a mode, then of four steps; return its first value."""
+    _sum_four(force, inputs, 0, raised[0], raised[1], raised[2], raised[3])
+    for j in range(4, len(raised), 2):
+        _add_pair(force, inputs[j], raised[j], inputs[j + 1], raised[j + 1])
+    _gather_four(force, turn, sums[0], sums[1])
+    first: float = force[0]
+    return first
 
 
 @kernel
@@ -159,21 +223,19 @@ def _respond(
     swings: Any,
     raised: Any,
     states: Any,
-    block: Any,
     force: Any,
-    real: Any,
-    imaginary: Any,
-    x: Any,
-    y: Any,
+    sums: Any,
+    motion: Any,
     total: Any,
 ) -> None:
     """Response of bare modal masses to `forces`, plus that of every mode's springs and dashpots.
 
     The latter see linear interpolation of the forces filtered by the symmetric `taps`; if `fresh`,
     they start in equilibrium with the first of them. The forces are whole blocks, with those of
-    ``_REACH`` steps before and after. Coefficients are those of :class:`_Steps`; `raised` and the
-    following are scratch, rows of ``_ROW``, of which `raised` and `states` [shape=(n_modes, 2, 8)],
-    the last eight states of every mode, persist between calls.
+    ``_REACH`` steps before and after. Coefficients are those of :class:`_ModesInMotion`, of an even
+    number of modes and outputs; `raised` and the following are scratch, rows of ``_ROW``, of which
+    `raised` and `states` [shape=(n_modes, 2, 8)], the last eight states of every mode, persist
+    between calls.
     """
     for first in range(0, acceleration.shape[1], BLOCK):
         begins = fresh and first == 0
@@ -181,32 +243,43 @@ def _respond(
         for j in range(len(forces)):
             for i in range(_AHEAD):
                 raised[j, i] = raised[j, i + BLOCK]
-            _read(forces[j], first, block)
-            _raise(block, taps, raised[j])
+            row, high, at, at_high = forces[j], raised[j], direct[j], raised_direct[j]
+            _feel(row, first, taps, high, total[0], total[1], at, at_high)
+            for k in range(2, len(total), 2):
+                _add_direct(row, first, high, total[k], total[k + 1], at[k:], at_high[k:])
             if begins:
                 for i in range(_AHEAD):
                     raised[j, i] = raised[j, _AHEAD]
-            for k in range(len(total)):
-                _add_direct(total[k], direct[k, j], block, raised_direct[k, j], raised[j])
-        for m in range(len(inputs)):
-            _sum_four(force, inputs[m], 0, raised[0], raised[1], raised[2], raised[3])
-            for j in range(4, len(raised), 2):
-                _add_pair(force, inputs[m, j], raised[j], inputs[m, j + 1], raised[j + 1])
-            for i in range(_AHEAD):
-                balance = turns[m, 5] * force[0]
-                x[i] = balance.real if begins else states[m, 0, i]
-                y[i] = balance.imag if begins else states[m, 1, i]
-            _gather_four(force, turns[m], real, imaginary)
-            _turn_eight(real, imaginary, turns[m], x, y)
-            for i in range(_AHEAD):
-                states[m, 0, i], states[m, 1, i] = x[i + BLOCK], y[i + BLOCK]
-            paired = len(total) // 2 * 2
-            for k in range(0, paired, 2):
-                a, b = swings[m, k], swings[m, k + 1]
-                _add_modal_twice(total[k], a.imag, a.real, total[k + 1], b.imag, b.real, x, y)
-            for k in range(paired, len(total)):
-                _add_modal(total[k], swings[m, k].imag, x, swings[m, k].real, y)
-        for k in range(len(total)):
+        for m in range(0, len(inputs), 2):
+            for n in range(2):
+                turn = turns[m + n]
+                balance = turn[5] * _push(raised, inputs[m + n], turn, force, sums[n])
+                for i in range(_AHEAD):
+                    motion[n, 0, i] = balance.real if begins else states[m + n, 0, i]
+                    motion[n, 1, i] = balance.imag if begins else states[m + n, 1, i]
+            _turn_two(
+                turns[m],
+                swings[m],
+                motion[0, 0],
+                motion[0, 1],
+                sums[0, 0],
+                sums[0, 1],
+                turns[m + 1],
+                swings[m + 1],
+                motion[1, 0],
+                motion[1, 1],
+                sums[1, 0],
+                sums[1, 1],
+                total[0],
+                total[1],
+            )
+            for n in range(2):
+                for k in range(2, len(total), 2):
+                    _add_modal(swings[m + n, k:], motion[n], total[k], total[k + 1])
+                for i in range(_AHEAD):
+                    states[m + n, 0, i] = motion[n, 0, i + BLOCK]
+                    states[m + n, 1, i] = motion[n, 1, i + BLOCK]
+        for k in range(len(acceleration)):
             write_rows(total[k], first, BLOCK, acceleration[k])
 
 
@@ -273,22 +346,35 @@ class _ModesInMotion:
     def __init__(self, modes: CasingModes, taps: NDArray[np.float64], step_rate: float) -> None:
         share, turns, swings = _steps(modes, 1 / step_rate)
         n_inputs, n_outputs = modes.inputs.shape[1], modes.outputs.shape[1]
-        pairs = max(2, -(-n_inputs // 2))
         self._window = np.empty((n_inputs, PIECE + 2 * (BLOCK + _REACH)))
         self._filled = 0
         self._fresh = True
         self._n_outputs = n_outputs
+        # zeros up to the even numbers that the loops take
+        more_modes, more_outputs = len(turns) % 2, max(2, n_outputs + n_outputs % 2) - n_outputs
+        more_inputs = max(4, n_inputs + n_inputs % 2) - n_inputs
+        inputs = np.pad(modes.inputs, ((0, more_modes), (0, more_inputs)))
+        outputs = np.pad(modes.outputs, ((0, more_modes), (0, more_outputs)))
+        turns = np.pad(turns, ((0, more_modes), (0, 0)))
+        at_once, at_once_raised = (
+            np.ascontiguousarray(np.pad(gain, ((0, more_outputs), (0, 0))).T)
+            for gain in (
+                modes.outputs.T @ modes.inputs,
+                (modes.outputs * share[:, None]).T @ modes.inputs,
+            )
+        )
         self._told: tuple[Any, ...] = (
             taps,
-            np.pad(modes.inputs, ((0, 0), (0, 2 * pairs - n_inputs))),
-            modes.outputs.T @ modes.inputs,
-            (modes.outputs * share[:, None]).T @ modes.inputs,
+            inputs,
+            at_once,
+            at_once_raised,
             turns,
-            modes.outputs * swings[:, None],
-            np.zeros((2 * pairs, _ROW)),
+            outputs * np.pad(swings, (0, more_modes))[:, None],
+            np.zeros((inputs.shape[1], _ROW)),
             np.zeros((len(turns), 2, _AHEAD)),
-            *np.zeros((6, _ROW)),
-            np.zeros((n_outputs, _ROW)),
+            np.zeros(_ROW),
+            *np.zeros((2, 2, 2, _ROW)),
+            np.zeros((outputs.shape[1], _ROW)),
         )
 
     def add(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:

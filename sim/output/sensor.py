@@ -1,6 +1,7 @@
 """Effect of accelerometer, tacho and converter on a signal."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -274,15 +275,29 @@ def coloured_noise(
     >>> bool(np.ptp(octaves) < 0.1 * max(octaves)), round(float(x.std()), 1)
     (True, 2.0)
     """
-    if rms == 0:
-        return np.zeros(n)
-    white = rng.standard_normal(n)
-    if slope == 0:
-        return np.asarray(rms * white)
-    frequency = np.fft.rfftfreq(n, 1 / fs)[1:]
-    weight = frequency ** (-slope / 2)
-    weight *= rms / math.sqrt(float(np.mean(weight**2)))
-    return np.asarray(np.fft.irfft(np.fft.rfft(white) * np.append(0.0, weight), n))
+    white = rng.standard_normal((1, n)) if rms else np.zeros((1, n))
+    return np.asarray(_coloured(white, fs, [rms], [slope])[0])
+
+
+def _coloured(
+    white: NDArray[np.float64], fs: float, rms: Sequence[float], slopes: Sequence[float]
+) -> NDArray[np.float64]:
+    """Rows of white noise, rms 1, with each its rms and slope; transformed together."""
+    n = white.shape[1]
+    sloped = [k for k, slope in enumerate(slopes) if slope and rms[k]]
+    if sloped:
+        spectra = np.fft.rfft(white[sloped])
+        frequency = np.fft.rfftfreq(n, 1 / fs)[1:]
+        for spectrum, k in zip(spectra, sloped, strict=True):
+            weight = frequency ** (-slopes[k] / 2)
+            weight *= rms[k] / math.sqrt(float(np.mean(weight**2)))
+            spectrum[0] = 0.0
+            spectrum[1:] *= weight
+        white[sloped] = np.fft.irfft(spectra, n)
+    for k, row in enumerate(white):
+        if k not in sloped:
+            row *= rms[k]
+    return white
 
 
 HUM = ((1, 1.0), (2, 0.3), (3, 0.5), (5, 0.25))
@@ -359,9 +374,9 @@ class NoisySensor(Protocol):
 
 
 def floor_of(
-    sensor: NoisySensor, n: int, fs: float, *, slope: float = 0.0, rng: np.random.Generator
+    sensor: NoisySensor, n: int, fs: float, *, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Reading of a sensor on a machine at rest: its own noise and mains hum.
+    """Reading of a sensor on a machine at rest: its own white noise and mains hum.
 
     Parameters
     ----------
@@ -370,8 +385,6 @@ def floor_of(
         Number of samples.
     fs : float
         Sample rate [Hz].
-    slope : float
-        The power density of its noise falls as ``1 / f**slope``.
     rng : numpy.random.Generator
 
     Returns
@@ -386,10 +399,45 @@ def floor_of(
     >>> round(float(floor_of(probe, 4000, 1e3, rng=np.random.default_rng(0)).std()), 1)
     5.0
     """
-    floor = coloured_noise(n, fs, rms=sensor.noise, slope=slope, rng=rng)
-    if sensor.mains > 0:
-        floor += mains_hum(n, fs, rms=sensor.mains, frequency=sensor.mains_frequency, rng=rng)
-    return floor
+    return np.asarray(floors_of([sensor], n, fs, slopes=[0.0], rng=rng)[0])
+
+
+def floors_of(
+    sensors: Sequence[NoisySensor],
+    n: int,
+    fs: float,
+    *,
+    slopes: Sequence[float],
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Like :func:`floor_of`, for several sensors in order, with coloured noise.
+
+    Parameters
+    ----------
+    sensors : sequence of NoisySensor
+    n : int
+        Number of samples.
+    fs : float
+        Sample rate [Hz].
+    slopes : sequence of float
+        The power density of each one's noise falls as ``1 / f**slope``.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_sensors, n)]
+        Noise in the unit of each sensor; the same bytes as one after the other.
+    """
+    floors, hums = np.zeros((len(sensors), n)), {}
+    for k, sensor in enumerate(sensors):
+        if sensor.noise:
+            rng.standard_normal(out=floors[k])
+        if sensor.mains > 0:
+            hums[k] = mains_hum(n, fs, rms=sensor.mains, frequency=sensor.mains_frequency, rng=rng)
+    floors = _coloured(floors, fs, [sensor.noise for sensor in sensors], slopes)
+    for k, hum in hums.items():
+        floors[k] += hum
+    return floors
 
 
 def digitise(
@@ -431,15 +479,18 @@ def digitise(
     >>> digitise(np.array([0.0, 30.0]), gain=1.0, noise=0.0, full_scale=20.0, bits=16, rng=rng)
     (array([ 0., 20.], dtype=float32), 1)
     """
-    signal = gain * acceleration
+    signal = gain * acceleration  # changed in place from here on, for speed
     if isinstance(noise, np.ndarray):
-        signal = signal + noise
+        signal += noise
     elif noise > 0:
-        signal = signal + noise * rng.standard_normal(signal.shape)
+        signal += noise * rng.standard_normal(signal.shape)
     step = 2 * full_scale / 2**bits
-    clipped = int(np.count_nonzero(np.abs(signal) > full_scale))
-    rounded = np.round(np.clip(signal, -full_scale, full_scale) / step) * step
-    return rounded.astype(np.float32), clipped
+    clipped = int(np.count_nonzero(signal > full_scale) + np.count_nonzero(signal < -full_scale))
+    np.clip(signal, -full_scale, full_scale, out=signal)
+    signal /= step
+    np.rint(signal, out=signal)
+    signal *= step
+    return signal.astype(np.float32), clipped
 
 
 def tacho_pulses(
@@ -470,9 +521,15 @@ def tacho_pulses(
     array([0., 2., 4.], dtype=float32)
     """
     # integral of the pulse train over angle: complete pulses, and the part of the present one
-    inner = (revolutions[1:] + revolutions[:-1]) / 2
-    ends = 2 * revolutions[[0, -1]] - inner[[0, -1]]
-    border = np.concatenate([ends[:1], inner, ends[1:]])
-    whole = np.floor(border)
-    area = whole * pulse_width + np.minimum(border - whole, pulse_width)
-    return np.asarray(level * np.diff(area) / np.diff(border), dtype=np.float32)
+    border = np.empty(len(revolutions) + 1)
+    inner = np.add(revolutions[1:], revolutions[:-1], out=border[1:-1])
+    inner /= 2
+    border[[0, -1]] = 2 * revolutions[[0, -1]] - inner[[0, -1]]
+    area = np.floor(border)
+    part = border - area
+    area *= pulse_width
+    area += np.minimum(part, pulse_width, out=part)
+    pulses = np.diff(area)
+    pulses *= level
+    pulses /= np.diff(border)
+    return pulses.astype(np.float32)

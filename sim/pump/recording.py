@@ -13,7 +13,7 @@ from ..output.recording import Recording
 from ..output.sensor import (
     anti_alias_poles,
     digitise,
-    floor_of,
+    floors_of,
     low_pass,
     mounting_poles,
 )
@@ -199,13 +199,14 @@ def _measured(
     scene = plan.scene
     rng = np.random.default_rng(seed)
     rows, clipped = [], 0
-    for sensor, row in zip(scene.accelerometers, acceleration, strict=True):
+    sensors, fs = scene.accelerometers, scene.sample_rate
+    slopes = [sensor.noise_slope for sensor in sensors]
+    floors = floors_of(sensors, plan.n_samples, fs, slopes=slopes, rng=rng)
+    for sensor, row, floor in zip(sensors, acceleration, floors, strict=True):
         channel, lost = digitise(
-            _front_end(sensor, row, scene.sample_rate)[plan.kept],
+            _front_end(sensor, row, fs)[plan.kept],
             gain=sensor.gain,
-            noise=floor_of(
-                sensor, plan.n_samples, scene.sample_rate, slope=sensor.noise_slope, rng=rng
-            ),
+            noise=floor,
             full_scale=sensor.range,
             bits=sensor.bits,
             rng=rng,
