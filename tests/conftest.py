@@ -106,12 +106,12 @@ def small_set(common: Path) -> Path:
     )
 
 
-def trained_once(path: Path, data: Path) -> Any:
+def trained_once(path: Path, data: Path, seed: int = 0) -> Any:
     """What `train_model` returns of a set, kept in a file for all test processes."""
     from wearstate.diagnose.wear_model.train import train_model
 
     def train(path: Path) -> None:
-        path.write_bytes(pickle.dumps(train_model(data, seed=0)))
+        path.write_bytes(pickle.dumps(train_model(data, seed=seed)))
 
     return pickle.loads(made_once(path, train).read_bytes())
 
@@ -120,6 +120,23 @@ def trained_once(path: Path, data: Path) -> Any:
 def small_trained(common: Path, small_set: Path) -> Any:
     """What `train_model` returns of `small_set`: model, feature table and rows held out."""
     return trained_once(common / "trained.pickle", small_set)
+
+
+@pytest.fixture(scope="session")
+def journal_set(common: Path) -> Path:
+    """Data set of the recipe journal-bearing-small: 120 simulated records."""
+    from wearstate.datasets.generation.generate import generate
+
+    return made_once(
+        common / "journal.h5",
+        lambda path: generate("journal-bearing-small", 120, path, seed=3, jobs=1),
+    )
+
+
+@pytest.fixture(scope="module")
+def journal_trained(common: Path, journal_set: Path) -> Any:
+    """What `train_model` returns of `journal_set`."""
+    return trained_once(common / "journal-trained.pickle", journal_set, seed=3)
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,6 @@ from wearstate.diagnose.report.page import report_html
 from wearstate.diagnose.report.text import report_text
 from wearstate.diagnose.report.verdict import report_table
 from wearstate.diagnose.wear_model.file import save_model
-from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene, scene_names
 
@@ -35,15 +34,13 @@ def run(*arguments, code=0):
 
 
 @pytest.fixture(scope="module")
-def data(tmp_path_factory):
-    path = tmp_path_factory.mktemp("journal") / "data.h5"
-    generate("journal-bearing-small", N, path, seed=3)
-    return path
+def data(journal_set):
+    return journal_set
 
 
 @pytest.fixture(scope="module")
-def trained(data):
-    return train_model(data, seed=3)
+def trained(journal_trained):
+    return journal_trained
 
 
 # --- probes

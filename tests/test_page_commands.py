@@ -251,14 +251,11 @@ def jacks(path, request):
 
 
 @pytest.fixture(scope="module")
-def bearing_model(common):
-    """Wear model of 24 journal bearings."""
-
-    def make(path):
-        generate("journal-bearing-small", 24, path.with_suffix(".h5"), seed=3)
-        wearstate.save_model(wearstate.train(path.with_suffix(".h5"), seed=0), path)
-
-    return made_once(common / "bearing.wsm", make)
+def bearing_model(common, journal_trained):
+    """Wear model of journal bearings."""
+    return made_once(
+        common / "bearing.wsm", lambda path: wearstate.save_model(journal_trained[0], path)
+    )
 
 
 STAND_INS = {

@@ -878,15 +878,24 @@ def test_a_part_without_familiar_records_has_no_error(trained):
     assert parts["none"]["mae_m"] is not None
 
 
+@pytest.fixture(scope="module")
+def two_trained(tmp_path_factory):
+    """A set with two severities, and the model of the first."""
+    folder = tmp_path_factory.mktemp("two")
+    with pytest.MonkeyPatch.context() as patch:
+        worn(patch)
+        recipe = load_recipe(written(folder, WORN), SHORT)
+        generate(recipe, 24, folder / "data.h5", seed=2)
+        return folder / "data.h5", train_model(folder / "data.h5")[0]
+
+
 @pytest.fixture
-def two_labels(tmp_path, second):
-    recipe = load_recipe(written(tmp_path, WORN), SHORT)
-    generate(recipe, 24, tmp_path / "data.h5", seed=2)
-    return tmp_path / "data.h5"
+def two_labels(two_trained, second):
+    return two_trained[0]
 
 
-def test_a_set_without_confounders_is_judged_as_before(two_labels):
-    result = evaluate_model(train_model(two_labels)[0], two_labels)
+def test_a_set_without_confounders_is_judged_as_before(two_trained, two_labels):
+    result = evaluate_model(two_trained[1], two_labels)
     assert result["by_confounder"] == {}
     assert part_lines("confounder", {}) == []
     assert describe(two_labels)["confounders"] == {}
@@ -901,16 +910,15 @@ def test_info_lists_confounders(labelled):
     assert f"throttled in {count}" in description_text(described)
 
 
-def test_a_model_for_another_severity(two_labels, monkeypatch):
+def test_a_model_for_another_severity(two_trained, two_labels, monkeypatch):
     with pytest.raises(
         DataError, match=r"target = 'wear' must be one of its severities diametral_clearance_"
     ):
         train_model(two_labels, target="wear")
     with pytest.raises(DataError, match="centre_of_mass_rod_m has 0 grade edges, must have 3"):
         train_model(two_labels, target="centre_of_mass_rod_m")
-    first, _, _ = train_model(two_labels)
     named, _, _ = train_model(two_labels, target="diametral_clearance_crankpin_m")
-    assert named.card == first.card
+    assert named.card == two_trained[1].card
     worn(monkeypatch, "wear")
     model, table, test = train_model(two_labels, target="centre_of_mass_rod_m")
     wear = load_scene("bilge-pump").wear
