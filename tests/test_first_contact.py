@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import click
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from wearstate.datasets.recipe.load import load_recipe
@@ -14,7 +15,7 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.options.help import _GROUPS, EXAMPLES
 from wearstate.diagnose.options.names import built_in
 from wearstate.sim.parts.units import UNITS, to_si
-from wearstate.sim.scene.load import minimal_text, scene_names
+from wearstate.sim.scene.load import load_scene, minimal_text, scene_names
 
 from .test_cli import refused, run, strict
 
@@ -273,3 +274,19 @@ def test_completion_offers_commands_scenes_recipes_and_options(words, place, off
         [sys.executable, "-c", code], env=told, capture_output=True, text=True, timeout=60
     )
     assert offered in done.stdout.splitlines()
+
+
+def test_a_decimal_comma_is_named_with_its_cure():
+    with pytest.raises(ValueError, match=r"has a decimal comma; write '3\.5 bar'"):
+        to_si(" 3,5 bar ", "pressure")
+    with pytest.raises(ValueError, match=r"has unit ', bar', not one of pressure"):
+        to_si("3, bar", "pressure")
+
+
+@pytest.mark.parametrize("number", [np.float32(0.5), np.float64(0.5), np.int64(2), 2])
+def test_numbers_of_numpy_are_numbers(number):
+    """A value from a table of float32 is no text without a unit."""
+    assert to_si(number, "pressure") == float(number)
+    assert load_scene("bilge-pump", {"pressure.suction": number}).pressure.suction == float(number)
+    with pytest.raises(ValueError, match="is not a number"):
+        to_si(np.bool_(True), "pressure")

@@ -1,6 +1,7 @@
 """One simulated recording of a scene, with rungs chosen if the scene leaves them open."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from operator import index
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from ...sim.machine import simulate as machine
 from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_from_table
 from ...sim.scene.scene import Scene, SceneError
+from ..recipe.recipe import condition_of, conditions_of
 from .quantities import resolved, with_estimate
 
 
@@ -38,7 +40,8 @@ def simulate(
     Returns
     -------
     Recording
-        Its ``warnings`` list implausible properties of scene and signal.
+        Its ``warnings`` list implausible properties of scene and signal, its ``row`` holds the
+        operating conditions (speed, pressures, load, oil), which models use.
 
     Raises
     ------
@@ -58,6 +61,8 @@ def simulate(
     >>> recording = wearstate.simulate(scene, truth=True)
     >>> recording.truth["pin_force_n"].shape, recording.time.shape
     ((25600, 2), (25600,))
+    >>> recording.row["discharge_pressure_pa"]
+    300000.0
 
     A table as from a TOML file is a scene, too:
 
@@ -69,6 +74,8 @@ def simulate(
         raise ValueError(f"seed = {seed} must be a whole number >= 0")
     chosen, resolution = resolved(_scene_of(scene))
     recording = machine.simulate(chosen, seed=seed, truth=truth, raise_on_failure=raise_on_failure)
+    known = {name: condition_of(chosen, name) for name in conditions_of(chosen)}
+    recording = replace(recording, row={**recording.row, **known})
     return recording if resolution is None else with_estimate(recording, resolution)
 
 

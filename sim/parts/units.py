@@ -4,6 +4,7 @@ import math
 import re
 from decimal import Decimal
 from functools import lru_cache
+from numbers import Real
 from typing import Any
 
 from ..output.spellings import spellings
@@ -90,14 +91,14 @@ def to_si(value: Any, dimension: str) -> float:
     >>> to_si("300 rpm", "rotation speed")
     5.0
     """
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+    if isinstance(value, bool) or not isinstance(value, (Real, str)):  # NumPy's are Real, too
         raise ValueError(f"is not a number or a string with a unit ({_unit_list(dimension)})")
-    if not isinstance(value, str):
-        try:
-            return float(value)
-        except OverflowError:  # an integer of hundreds of digits
-            return math.inf if value > 0 else -math.inf
-    return _text_to_si(value, dimension)
+    if isinstance(value, str):
+        return _text_to_si(value, dimension)
+    try:
+        return float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return math.inf if value == abs(value) else -math.inf
 
 
 @lru_cache(maxsize=4096)
@@ -111,6 +112,8 @@ def _text_to_si(value: str, dimension: str) -> float:
     number, unit = match["number"], listed_unit(match["unit"], dimension)
     if unit is None:
         unit = match["unit"]
+        if re.match(r",\d", unit):
+            raise ValueError(f"has a decimal comma; write '{value.replace(',', '.', 1).strip()}'")
         missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
         raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
     try:  # a decimal product makes 0.13 mm exactly 0.00013, a product of two floats would not
