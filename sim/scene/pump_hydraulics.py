@@ -370,6 +370,7 @@ class CylinderPressure(Part):
             return []
         return [
             f"discharge = {self.discharge:g} Pa must be >= suction = {self.suction:g} Pa; swap them"
+            " or correct one, both are gauge pressures"
         ]
 
     def _missing(self) -> list[str]:
