@@ -355,6 +355,12 @@ def test_a_report_names_the_conditions_that_its_estimate_uses(model):
         "pressure.suction = -30 kPa (bilge-pump)",
     ]
     assert report_table(found, model, graded())["conditions"] == []
+    oil = report_table(
+        dataclasses.replace(found, row={"viscosity_pa_s": 0.03}),
+        model,
+        graded(noted=("viscosity_pa_s",)),
+    )
+    assert [each["path"] for each in oil["conditions"]] == ["oil.viscosity"]  # as --set takes it
 
 
 def test_another_model_is_named_to_the_command(model_file, tmp_path):

@@ -12,7 +12,6 @@ from typing import Any
 from ... import __version__
 from ...features.signal import iso
 from ...sim.output.recording import DataError, Recording
-from ...sim.scene.load import all_condition_places
 from ..feature_rows.feature_choice import choice_in, words_of
 from ..feature_rows.feature_table import is_regime, regime_words
 from ..feature_rows.model_card import ModelCard
@@ -176,10 +175,10 @@ def conditions_table(
     estimate: Estimate, plate: Nameplate | None, row: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """Operating conditions that an estimate uses: path, column, value [SI], unit, origin, text."""
-    known, places = day_of(plate, row), all_condition_places()
+    known = day_of(plate, row)
     return [
         {
-            "path": (path := places[column].path),
+            "path": (path := NOTED[column].setting.partition("=")[0]),
             "column": column,
             "value": float(known[column]),
             "unit": NOTED[column].unit,
