@@ -28,6 +28,7 @@ _COSTED = 16  # drawn scenes whose cost is looked up
 _ROW_BYTES = 64  # in a row of the manifest: name, group, seed, status, checksum
 _COLUMNS = 2  # of panels: readable on a phone
 _HEAD, _ROW = 0.8, 1.75  # inch, of the heading and of a row of panels
+_LARGE = 1e6  # numbers from here on are read better with an exponent
 _LEVELS = ("severity", "machine", "record", "confounder")
 
 
@@ -95,6 +96,7 @@ class Preview:
             "confounders": _shares(recipe, samples),
             "held_out": _regions(recipe, samples),
             "draws": [_summary(recipe, *draw) for draw in _draws(recipe)],
+            "choices": _choices(recipe),
             "correlations": [entry.model_dump() for entry in recipe.table.correlation],
         }
 
@@ -199,10 +201,45 @@ def _summary(recipe: Recipe, level: str, draw: Draw) -> dict[str, Any]:
     }
 
 
+def _choices(recipe: Recipe) -> list[dict[str, Any]]:
+    """Options of every choice: share of the machines or records, values set, values drawn."""
+    shares = {
+        (each.name, option.name): option.share for each in recipe.choices for option in each.options
+    }
+    return [
+        {
+            "name": choice.name,
+            "per": choice.per,
+            "options": [
+                {
+                    "name": option.name,
+                    "share": shares[choice.name, option.name],
+                    "values": dict(option.values),
+                    "draws": [
+                        {
+                            "path": draw.path,
+                            "distribution": draw.distribution,
+                            "as_written": _as_written(draw),
+                        }
+                        for draw in option.draw
+                    ],
+                }
+                for option in choice.option
+            ],
+        }
+        for choice in recipe.table.choice
+    ]
+
+
 def _as_written(draw: Draw) -> str:
     if draw.scale is not None:
         return f"norm changed by {100 * draw.scale:g} %"
-    return " or ".join(f"{low} to {high}" for low, high in draw.ranges)
+    return " or ".join(f"{_bound(low)} to {_bound(high)}" for low, high in draw.ranges)
+
+
+def _bound(value: float | str) -> str:
+    """A bound as written; stiffnesses with an exponent."""
+    return f"{value:g}" if isinstance(value, float) and abs(value) >= _LARGE else str(value)
 
 
 def preview_text(table: Mapping[str, Any]) -> str:
@@ -240,7 +277,7 @@ def preview_text(table: Mapping[str, Any]) -> str:
     lines += [
         f"  correlation {c['rank']:+g}: {', '.join(c['paths'])}" for c in table["correlations"]
     ]
-    return "\n".join([*lines, *_draw_lines(table["draws"])])
+    return "\n".join([*lines, *_draw_lines(table["draws"]), *_choice_lines(table["choices"])])
 
 
 def _not_in_it(fidelity: str) -> str:
@@ -277,6 +314,23 @@ def _draw_lines(draws: Sequence[Mapping[str, Any]]) -> list[str]:
         + (f" ({len(draw['values'])} values)" if len(draw["values"]) > 1 else "")
         for draw in draws
     ]
+
+
+def _choice_lines(choices: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line for each option; a value that is drawn is not shown as set, too."""
+    options = [(f"{each['name']} = {o['name']}", o) for each in choices for o in each["options"]]
+    width = max((len(name) for name, _ in options), default=0)
+    return [
+        f"    choice     {name:{width}}  {option['share']:5.1%}  {_option_words(option)}".rstrip()
+        for name, option in options
+    ]
+
+
+def _option_words(option: Mapping[str, Any]) -> str:
+    drawn = [f"{d['path']} {d['distribution']} {d['as_written']}" for d in option["draws"]]
+    paths = {draw["path"] for draw in option["draws"]}
+    fixed = [f"{path} = {value}" for path, value in option["values"].items() if path not in paths]
+    return "; ".join([*fixed, *drawn])
 
 
 def preview_figure(found: Preview) -> Any:
