@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -60,9 +60,8 @@ def scene_plant(
     *,
     force: Place,
     sample_rate: float,
-    direction: Literal["up", "side"] = "up",
 ) -> Plant:
-    """Shaft of a scene in steady running, with an accelerometer on every housing.
+    """Shaft of a scene in steady running, with a vertical accelerometer on every housing.
 
     Parameters
     ----------
@@ -75,8 +74,6 @@ def scene_plant(
         load, a bearing or the coupling.
     sample_rate : float
         Sample rate of the test [Hz].
-    direction : str
-        Direction of the accelerometers, ``up`` or ``side``.
 
     Returns
     -------
@@ -92,12 +89,11 @@ def scene_plant(
         A place or a move is unknown.
     """
     state = shaft_state(scene, moves)
-    coordinate = {"up": "y", "side": "z"}[direction]
     return rotor_plant(
         state.rotor,
         speed=math.tau * scene.drive.speed,
         force=force,
-        responses={b.name: (b.name, coordinate, "housing") for b in scene.bearings},
+        responses={b.name: (b.name, "y", "housing") for b in scene.bearings},
         sample_rate=sample_rate,
         harmonics=harmonic_forces(scene),
         broadband=random_forces(scene.model_copy(update={"sample_rate": sample_rate})),

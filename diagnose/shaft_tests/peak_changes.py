@@ -21,6 +21,7 @@ _SEARCH_SHARE = 0.1  # largest shift of a peak by alignment, relative to its fre
 _DEVIATIONS = 8.0  # height of a peak: the range of some hundred values is 6 deviations
 _SMOOTHED = 5  # lines averaged to find a peak
 _CHANCE = 1e-6  # probability of a peak's coherence if force and response are unrelated
+_CONFIDENCE = 0.95  # of the intervals of a change
 
 PROMINENCE_DB = 3.0  # a factor of two in power
 
@@ -139,28 +140,18 @@ def level_db(value: Complex | Float) -> Float:
     return np.asarray(20 * np.log10(np.abs(value) + TINY))
 
 
-def peak_changes(
-    before: RigTest,
-    after: RigTest,
-    *,
-    prominence: float = PROMINENCE_DB,
-    confidence: float = 0.95,
-) -> tuple[PeakChange, ...]:
+def peak_changes(before: RigTest, after: RigTest) -> tuple[PeakChange, ...]:
     """Match every peak of the first test with the second, and vice versa.
 
     Parameters
     ----------
     before, after : RigTest
         Tests with the same channels and lines.
-    prominence : float
-        As in `find_frf_peaks` [dB].
-    confidence : float
-        Confidence of the intervals; verdicts have the level ``1 - confidence`` jointly [-].
 
     Returns
     -------
     tuple of PeakChange
-        Sorted by channel, then frequency.
+        Sorted by channel, then frequency. Intervals of 95 %; verdicts have a level of 5 % jointly.
 
     Raises
     ------
@@ -186,17 +177,16 @@ def peak_changes(
     (1979) 65-70.
     """
     _check_same(before, after)
-    tops = find_frf_peaks(before.frf, prominence=prominence)
-    others = find_frf_peaks(after.frf, prominence=prominence / 3)
-    new = find_frf_peaks(after.frf, prominence=prominence)
+    tops, new = find_frf_peaks(before.frf), find_frf_peaks(after.frf)
+    others = find_frf_peaks(after.frf, prominence=PROMINENCE_DB / 3)
     found = [
-        _compared(before, after, channel, line, later, confidence)
+        _compared(before, after, channel, line, later)
         for channel, rows in enumerate(zip(tops, others, new, strict=True))
         for line, later in _pairs(before.frf.frequency, *rows)
     ]
     adjusted = holm([p_value for _, p_value in found])
     return tuple(
-        replace(peak, p_value=p, verdict=_verdict(peak.change, p, confidence))
+        replace(peak, p_value=p, verdict=_verdict(peak.change, p))
         for (peak, _), p in zip(found, adjusted, strict=True)
     )
 
@@ -234,7 +224,7 @@ def _pairs(
 
 
 def _compared(
-    before: RigTest, after: RigTest, channel: int, line: int, later: int, confidence: float
+    before: RigTest, after: RigTest, channel: int, line: int, later: int
 ) -> tuple[PeakChange, float]:
     """Change of one peak, and its unadjusted p-value."""
     sides = (before, line), (after, later)
@@ -246,7 +236,7 @@ def _compared(
     ]
     change = levels[1] - levels[0]
     freedom = [2 * test.frf.averages - 2 for test, _ in sides]
-    interval, p_value = _welch(change, errors, freedom, confidence)
+    interval, p_value = _welch(change, errors, freedom, _CONFIDENCE)
     peak = PeakChange(
         channel=before.channels[channel],
         frequency_before=float(before.frf.frequency[line]),
@@ -312,7 +302,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(p) for p in result]
 
 
-def _verdict(change: float, p_value: float, confidence: float) -> str:
-    if p_value >= 1 - confidence:
+def _verdict(change: float, p_value: float) -> str:
+    if p_value >= 1 - _CONFIDENCE:
         return "unchanged"
     return "suppressed" if change < 0 else "amplified"

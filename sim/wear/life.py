@@ -282,7 +282,6 @@ def life_history(
     until: float,
     running_in: RunningIn | None = None,
     maintenance: Sequence[Maintenance] = (),
-    ahead: float = 10.0,
 ) -> LifeHistory:
     """Wear of one machine over its life, including maintenance.
 
@@ -304,13 +303,12 @@ def life_history(
         None: new surfaces wear like old ones.
     maintenance : sequence of Maintenance
         Maintenance rules; several due together are all applied in this order.
-    ahead : float
-        Over `until`: period for which maintenance is simulated to find when the limit is next
-        reached and the surface next renewed, >= 1.
 
     Returns
     -------
     LifeHistory
+        Simulated ten times as long, to find when the limit is next reached and the surface next
+        renewed.
 
     Raises
     ------
@@ -337,15 +335,16 @@ def life_history(
     (250000, 0.0, 1)
     """
     running_in = RunningIn() if running_in is None else running_in
-    _refuse_life(wear_rate, limit, end, until, ahead, maintenance)
+    _refuse_life(wear_rate, limit, end, until, maintenance)
     plan = _Plan(law, wear_rate, running_in, tuple(maintenance), end, iter(as_new))
-    pieces = tuple(_pieces(plan, limit, until, until * ahead))
+    horizon = _AHEAD * until
+    pieces = tuple(_pieces(plan, limit, until, horizon))
     return LifeHistory(
         law=law,
         wear_rate=wear_rate,
         running_in=running_in,
         pieces=pieces,
-        crossings=tuple(_crossings(plan, pieces, law.volume_of(limit), until * ahead)),
+        crossings=tuple(_crossings(plan, pieces, law.volume_of(limit), horizon)),
         limit=limit,
     )
 
@@ -366,7 +365,6 @@ def _refuse_life(
     limit: float,
     end: float,
     until: float,
-    ahead: float,
     maintenance: Sequence[Maintenance],
 ) -> None:
     faults = []
@@ -376,8 +374,6 @@ def _refuse_life(
         faults.append(f"limit = {limit} m must be > 0 and <= end = {end} m; lower it or raise end")
     if not 0 < until < math.inf:
         faults.append(f"until = {until} s must be > 0 and finite")
-    if not ahead >= 1:
-        faults.append(f"ahead = {ahead} must be >= 1")
     faults += [
         f"maintenance.{i}.at = {rule.at} m must be < end = {end} m, where the joint fails; lower it"
         for i, rule in enumerate(maintenance)
@@ -410,6 +406,8 @@ def _pieces(plan: _Plan, limit: float, until: float, horizon: float) -> Iterator
             yield piece
             return
 
+
+_AHEAD = 10.0  # times the operating time to cover: how far maintenance is simulated
 
 _RENEWAL = Maintenance(restores=1.0, every=math.inf)  # after a failure
 
