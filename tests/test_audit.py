@@ -28,6 +28,8 @@ from wearstate.diagnose.inspect.audit_text import audit_text
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
+from .command_line import run
+
 NUISANCE = 3
 
 
@@ -725,12 +727,6 @@ def test_roles_of_a_data_set_are_checked_before_it_is_read(tmp_path):
 
 
 # --- words and the command
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture

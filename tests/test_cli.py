@@ -8,21 +8,13 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.recipe.text import recipe_text
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages.plain_json import json_text
 from wearstate.diagnose.workflow import demo
 from wearstate.sim.output.recording import DataError
 
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    assert result.exit_code == code, result.output
-    return result
+from .command_line import run
 
 
 def strict(text):

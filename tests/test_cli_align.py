@@ -1,16 +1,17 @@
 """`wearstate align`: the table of an engineer, JSON, page and picture, exit codes, refusals."""
 
 import json
+from functools import partial
 
 import pytest
-from click.testing import CliRunner
 from wearstate.diagnose.alignment.align import align
 from wearstate.diagnose.alignment.figure import align_figure
 from wearstate.diagnose.alignment.text import align_text
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.alignment.alignment import reactions
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
+
+from .command_line import run as command
 
 SCENE = "propulsion-shaft"
 SAGGED = ("--set", "bearings.2.sag=1.6 mm")  # the intermediate bearing lifts, and chocks mend it
@@ -20,12 +21,7 @@ for number in (2, 3, 4):
         STUCK += ["--set", f"bearings.{number}.limits.{bound}=0"]
 
 
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, ["align", *(str(a) for a in arguments)])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    assert result.exit_code == code, result.output
-    return result
+run = partial(command, "align")
 
 
 def strict(text):

@@ -6,20 +6,14 @@ from typing import get_args
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.file.record import DataSet
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.features import _FEATURE_SETS
 from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
 from wearstate.features.catalogue.catalogue import SETS, SetName
 from wearstate.features.signal import iso
 
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.stderr
-    return result
+from .command_line import run
 
 
 def test_the_sets_of_the_command_line_are_those_of_the_library():

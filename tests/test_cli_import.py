@@ -14,15 +14,9 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.options.shared import as_options
 from wearstate.sim.parts.units import STANDARD_GRAVITY
 
+from .command_line import run
+
 RAMP = np.arange(400.0)
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    assert result.exit_code == code, result.output
-    return result
 
 
 def strict(*arguments):

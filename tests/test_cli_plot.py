@@ -4,17 +4,17 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.writer import DataSetWriter
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.measured import _KINDS
 from wearstate.diagnose.inspect.info import plot_file
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS
 from wearstate.diagnose.report.figures import report_pictures
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 FS = 4096.0
 
@@ -23,12 +23,6 @@ def shaft(t, speed):
     """Readings of two probes and a tacho of a shaft that moves round an ellipse [m, m, V]."""
     x, y = 3e-5 * np.cos(2 * np.pi * speed * t), 1e-5 * np.sin(2 * np.pi * speed * t)
     return np.stack([x + y, x - y, np.where(speed * t % 1 < 0.1, 5.0, 0.0)])
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

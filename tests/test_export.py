@@ -13,7 +13,6 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_array_equal
 from scipy.io import wavfile
 from wearstate.datasets.audit.integrity import check_set
@@ -25,10 +24,11 @@ from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.measured.label_columns import RESERVED
 from wearstate.datasets.recipe.load import load_recipe
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 N = 6
 
@@ -74,12 +74,6 @@ def mixed(tmp_path_factory):
 
 def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 # -- there and back ----------------------------------------------------------------------------

@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.split.rules import group_folds
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_choice import choice_in, choices_of, select_set
 from wearstate.diagnose.feature_rows.feature_table import (
     USUAL,
@@ -27,6 +25,8 @@ from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 FS, N = 2560.0, 10_240
 COLUMN = "sag_support_m"
@@ -70,12 +70,6 @@ def pushed(path, *, machines=40, healthy=False, blows=0):
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     return pushed(tmp_path_factory.mktemp("tests") / "data.h5")
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 # --- what is said

@@ -3,11 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.writer import DataSetWriter
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
 from wearstate.diagnose.inspect.info import plot_file
 from wearstate.diagnose.pictures.envelope import envelope_panel
@@ -18,13 +16,9 @@ from wearstate.features.rotation import order
 from wearstate.features.signal.envelope import bearing_frequencies
 from wearstate.sim.output.sensor import Channel
 
+from .command_line import run
+
 BEARING = (8, 20.0, 120.0)
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def data_set(path, rate, rows, *, tacho=None, seconds=2.0, strikes=None):

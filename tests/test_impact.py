@@ -3,15 +3,15 @@
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.writer import DataSetWriter
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.features.catalogue import analysis
 from wearstate.features.catalogue import row as table
 from wearstate.features.response import frf, impact
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 FS, N = 2048.0, 8192
 POLES = ((100.0, 0.002), (300.0, 0.001))
@@ -157,12 +157,6 @@ def test_short_blocks_are_filled_and_agree():
     long = frf.h1(filled.between(50, 500))[0]
     at = np.interp(plain.between(50, 500).frequency, filled.between(50, 500).frequency, abs(long))
     assert_allclose(at, abs(frf.h1(plain.between(50, 500))[0]), rtol=0.02)
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def test_command_line_and_picture_tell_the_same(tmp_path):

@@ -5,14 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate, save_solution
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.severities import clearances, wear_limits
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import score
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
 from wearstate.diagnose.machines.picture import plot_simulation
@@ -23,14 +21,10 @@ from wearstate.diagnose.wear_model.file import save_model
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene, scene_names
 
+from .command_line import run
+
 N = 120
 CLEARANCE = "diametral_clearance_bearing_m"
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
-from wearstate.diagnose.command_line.cli import cli
+
+from .command_line import run
 
 SIGNAL = np.random.default_rng(3).standard_normal((3, 4000))
 SIGNAL[2] = np.arange(4000) % 50 < 5
@@ -28,12 +28,6 @@ def folder(tmp_path):
     }
     (tmp_path / "p.json").write_text(json.dumps(profile))
     return tmp_path
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def test_import_takes_names_units_rate_and_tacho_from_a_profile(folder):

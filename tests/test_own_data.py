@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.labels import read_labels
@@ -27,12 +26,13 @@ from wearstate.diagnose.class_model.train import (
     train_classes,
 )
 from wearstate.diagnose.class_model.votes import Votes, set_of
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.blows import NOISE_SCORE, blow_scores
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
 from wearstate.diagnose.wear_model.bundle import ModelError
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import DataError
+
+from .command_line import run
 
 RATE = 4000.0
 
@@ -310,12 +310,6 @@ def test_new_recordings_are_judged_and_known_ones_are_not(trained, tmp_path):
     assert (result["recordings"], result["recordings_right"]) == (8, 8)
     with pytest.raises(DataError, match="has not seen"):
         evaluate_classes(model, path)
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output + repr(result.exception)
-    return result
 
 
 def test_the_report_names_one_or_many_and_refuses_what_is_of_wear(trained, tmp_path):

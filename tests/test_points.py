@@ -7,17 +7,17 @@ import shutil
 import tomllib
 
 import pytest
-from click.testing import CliRunner
 from wearstate.diagnose.charts.chart import Chart, Point
 from wearstate.diagnose.charts.figure import BEST
 from wearstate.diagnose.charts.page import chart_html
 from wearstate.diagnose.charts.points import chart_points
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages import embed
 from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.pages.points import Mark, PointAxes, Series, point_block
 from wearstate.sim.fidelity.differences import Difference
 from wearstate.sim.output.recording import DataError
+
+from .command_line import run
 
 HOSTILE = "$$x$$ </script><img src=http://example.org/a>"
 BLOCK = '# scene: coarse\n[film]\nrung = "map"  # was direct'
@@ -53,12 +53,6 @@ def chart():
         winner="coarse",
         verdict="take coarse",
     )
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def item_in(html):

@@ -2,28 +2,26 @@
 
 import json
 import re
+from functools import partial
 
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe, recorded_recipe, recorded_scene
 from wearstate.datasets.recipe.records import overrides_text, sample_records
 from wearstate.datasets.recipe.severities import wear_limits
 from wearstate.datasets.recipe.text import recipe_names, recipe_text
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.recipe_preview import MOST_DRAWN, preview, preview_text
 from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.machine.simulate import check
 from wearstate.sim.scene.load import scene_text
 
+from .command_line import run as command
+
 CLEARANCE = "diametral_clearance_crankpin_m"
 
 
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, ["recipe", *map(str, arguments)])
-    assert result.exit_code == code, result.output
-    return result
+run = partial(command, "recipe")
 
 
 def table_of(*arguments):

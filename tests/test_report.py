@@ -11,13 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import wearstate
-from click.testing import CliRunner
 from matplotlib import pyplot
 from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.recipe.text import toml_text
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.report import report_exit
 from wearstate.diagnose.healthy_reference.healthy import Baseline, Baselines
 from wearstate.diagnose.nameplate.nameplate import Nameplate, nameplate_of
@@ -45,6 +43,8 @@ from wearstate.diagnose.workflow import report as workflow_report
 from wearstate.diagnose.workflow.report import Report
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 FS = 10240.0
 SPEED = 8.0  # Hz
@@ -150,12 +150,6 @@ def graded(**changes):
         evidence=(("acc.rms", 4.0, 2.0, 8.0), ("acc.order_02.level_db", -8.0, -14.0, 5.0)),
     )
     return dataclasses.replace(plain, **changes)
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output + repr(result.exception)
-    return result
 
 
 def shown(page):

@@ -1,6 +1,7 @@
 """Transfer functions of a scene, the command that writes them, and hammer tests of casings."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from wearstate.sim.pump.gathering import casing_modes
 from wearstate.sim.scene.load import load_scene, scene_text
 from wearstate.sim.scene.scene import SceneError
 
+from .command_line import run as command
+
 FS = 25_600.0
 TESTED = {
     "running": False,
@@ -31,10 +34,7 @@ TESTED = {
 FEET = {"casing.feet.bolt_stretch": "0.2 mm"}
 
 
-def run(*arguments, code=0):
-    found = CliRunner().invoke(cli, ["frf", *map(str, arguments)])
-    assert found.exit_code == code, found.output + found.stderr
-    return found
+run = partial(command, "frf")
 
 
 def measured(scene, seed=1):

@@ -4,14 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_array_equal
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate, save_solution
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.severities import clearances, wear_limits
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import score
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.machines.picture import plot_simulation
@@ -22,16 +20,12 @@ from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 
+from .command_line import run
+
 N = 120
 WEAR = "wear_down_bearing_1_m"
 SAG = "sag_bearing_3_m"
 OFFSET = "parallel_offset_coupling_m"
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
@@ -39,10 +38,11 @@ from wearstate.datasets.split.stored import (
     store_splits,
     usable_sides,
 )
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.data_sets import _SPLITS
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 MANY = st.lists(st.integers(-3, 9), min_size=2, max_size=60).filter(lambda g: len(set(g)) > 1)
 
@@ -427,12 +427,6 @@ def test_generate_stores_them(tmp_path):
         assert set(data.splits) == set(made) >= {"machine", "geometry"}
         for name, split in made.items():
             assert_array_equal(data.split(name)[1], split.test)
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 def test_the_command(path):

@@ -3,13 +3,12 @@
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.stability import atlas as stability_atlas
 from wearstate.diagnose.stability import method_map as stability
 from wearstate.diagnose.stability.atlas import atlas
@@ -39,6 +38,8 @@ from wearstate.sim.output.recording import DataError
 from wearstate.sim.pump_setup.contacts import contact_frequency, joint_mobility
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError
+
+from .command_line import run as command
 
 BY_NAME = {stepper.name: stepper for stepper in STEPPERS}
 FIVE_PER_CENT = 0.05  # what a measured limit may be off by from theory
@@ -395,10 +396,7 @@ def test_a_line_whirls_at_any_mesh():
 # --- command
 
 
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, ["stability", *map(str, arguments)])
-    assert result.exit_code == code, result.output
-    return result
+run = partial(command, "stability")
 
 
 def test_command_writes_picture_text_and_json(tmp_path):

@@ -8,12 +8,10 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.writer import DataSetWriter
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages import embed
 from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.pages.picture import PageImage
@@ -22,6 +20,8 @@ from wearstate.diagnose.pictures.zoom import zoom_block, zoom_page
 from wearstate.diagnose.pictures.zoom_curves import MOST_CHANNELS, ZoomCurve, zoom_curves
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
+
+from .command_line import run
 
 FS, SPEED, MESH = 8192.0, 20.0, 800.0
 HOSTILE = "$$x^2$$ </script><img src=http://example.org/a>"
@@ -64,12 +64,6 @@ def stored(tmp_path_factory):
         writer.write(0, made.signal, {"record_id": "0", "status": "ok"})
         writer.finish()
     return path
-
-
-def run(*arguments, code=0):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def curve_of(y, kind="spectrum"):
