@@ -5,6 +5,7 @@ import gc
 import os
 import pickle
 from collections.abc import Callable, Generator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,20 @@ def journal_set(common: Path) -> Path:
 def journal_trained(common: Path, journal_set: Path) -> Any:
     """What `train_model` returns of `journal_set`."""
     return trained_once(common / "journal-trained.pickle", journal_set, seed=3)
+
+
+@pytest.fixture(scope="session")
+def rig_sets(common: Path) -> Path:
+    """Folder of shaker tests of 16 shaft rigs, ``test.h5``, and of the rigs running, short."""
+    from wearstate.datasets.generation.generate import generate
+    from wearstate.datasets.recipe.load import load_recipe
+
+    short = {"duration": "18 s", "sample_rate": "512 Hz", "exciters.0.high": "200 Hz"}
+    (common / "rig").mkdir(exist_ok=True)
+    for name, view in (("test", ""), ("running", "running")):
+        recipe = load_recipe("shaft-rig-small", short, view=view)
+        made_once(common / "rig" / f"{name}.h5", partial(generate, recipe, 16, seed=3, jobs=1))
+    return common / "rig"
 
 
 @pytest.fixture(scope="session")

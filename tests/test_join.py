@@ -5,18 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.views import CompletingView, JoinedSet, views_of
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
-from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import evaluate_model
 from wearstate.diagnose.feature_rows.feature_table import FeatureSelection, feature_table
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import DataError
 
-RECORDS = 16
+from .command_line import run
 
 
 def _short():
@@ -25,12 +23,11 @@ def _short():
 
 
 @pytest.fixture(scope="module")
-def sets(tmp_path_factory):
+def sets(rig_sets, tmp_path_factory):
     """Shaker tests, and the same machine states running; made once, never written to."""
     folder = tmp_path_factory.mktemp("views")
-    for name, view in (("test", ""), ("running", "running")):
-        recipe = load_recipe("shaft-rig-small", _short(), view=view)
-        generate(recipe, RECORDS, folder / f"{name}.h5", seed=3)
+    for name in ("test.h5", "running.h5"):
+        (folder / name).symlink_to(rig_sets / name)
     return folder
 
 
@@ -181,9 +178,3 @@ def test_sets_that_do_not_belong_together_are_refused(sets, tmp_path):
         views_of([str(sets / "test.h5"), f"test={tmp_path / 'other.h5'}"])
     with pytest.raises(DataError, match="feature running:rms is of a view that is not joined"):
         feature_table(sets / "test.h5", choice=FeatureSelection(only=("rms", "running:rms")))
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
