@@ -13,7 +13,7 @@ from wearstate.diagnose.feature_rows.feature_rank import (
 )
 from wearstate.diagnose.feature_rows.feature_table import USUAL
 from wearstate.diagnose.inspect import rank_text as rank_module
-from wearstate.diagnose.inspect.rank_text import rank_set, value_images
+from wearstate.diagnose.inspect.rank_text import rank_lines, rank_set, rank_text, value_images
 
 from .test_cli import refused, run, strict
 
@@ -210,6 +210,18 @@ def test_records_without_a_label_are_left_out(small_set, small_trained, untimed)
     assert found.ranking.n_records == (table.manifest[severity] > 1e-4).sum()
     assert found.ranking.features[0].information > found.ranking.chance
     assert len(value_images(found)) == 6
+
+
+def test_few_records_are_said_to_be_few_and_not_ranked_by_nan(small_set, small_trained, untimed):
+    _, table, _ = small_trained
+    severity = "diametral_clearance_crankpin_m"
+    few = table.manifest[severity].where(np.arange(len(table.manifest)) < 5)
+    blank = table.manifest.assign(**{severity: few})
+    found = rank_set(small_set, replace(table, manifest=blank), USUAL)
+    (said,) = rank_lines(found)
+    assert said.startswith("5 records are too few to rank by information about diametral_clear")
+    assert "must be >= 10" in said
+    assert "nan" not in rank_text(found)
 
 
 def test_another_label_is_ranked_as_conditions(small_set, known_features, untimed):

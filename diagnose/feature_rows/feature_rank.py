@@ -16,7 +16,7 @@ Float = NDArray[np.float64]
 LEAST_OF_MACHINE = 4
 """Fewest records of one machine: with fewer, a rank correlation is 1 too easily."""
 
-_LEAST = 10  # fewest records with a value for an estimate of information
+LEAST_RANKED = 10  # fewest records with a value for an estimate of information
 _CHANCE = 95  # percentile of features without information that defines the chance level
 _SHUFFLED = 40  # fewest values for the chance level
 _PER_BIT = math.log(2)  # nats
@@ -169,7 +169,7 @@ def _numbered(labels: ArrayLike) -> Float:
 def _information(column: Float, aim: NDArray[Any], *, classes: bool, seed: int) -> float:
     """Mutual information of one feature with the target [bits]; 0 for a constant feature."""
     valid = np.isfinite(column)
-    if valid.sum() < _LEAST:
+    if valid.sum() < LEAST_RANKED:
         return math.nan
     own = _ranks(column[valid])
     if np.ptp(own) == 0:

@@ -14,7 +14,13 @@ from ...datasets.file.csv_cells import save_rows
 from ...datasets.file.record import DataSet
 from ...sim.output.recording import DataError
 from ..feature_rows.feature_choice import costs_ms
-from ..feature_rows.feature_rank import LEAST_OF_MACHINE, FeatureRank, Ranking, rank_features
+from ..feature_rows.feature_rank import (
+    LEAST_OF_MACHINE,
+    LEAST_RANKED,
+    FeatureRank,
+    Ranking,
+    rank_features,
+)
 from ..feature_rows.feature_table import FeatureSelection, FeatureTable
 from ..pages.page import render, save_page, short_name
 from ..pages.picture import PAGE_WIDTH, PageImage, drawn_alone, page_image
@@ -132,6 +138,11 @@ _COLUMNS = {
 def rank_lines(found: RankedSet) -> list[str]:
     """Results of the ranking in sentences."""
     ranking = found.ranking
+    if math.isnan(ranking.chance):
+        return [
+            f"{ranking.n_records} records are too few to rank by information about {found.target}, "
+            f"must be >= {LEAST_RANKED}; generate or record more"
+        ]
     best = ranking.features[0]
     lines = [
         f"{best.name} is most informative about {found.target}: {plain(best.information)} bits",
