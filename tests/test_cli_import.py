@@ -271,6 +271,10 @@ def test_the_report_on_a_wav_is_that_on_the_simulation(small_set, small_model, t
     assert ours["recording"]["origin"] == "measured"
     refused("report", path, *common, says=["--unit must be given"])
     refused("report", small_set, *common, "--unit", "g", says=["unit must not be given"])
+    swapped = strict("report", small_set, "--record", 7, *common, "--channels", "acc_x,acc_y")
+    assert swapped["estimate"] == theirs["estimate"]  # its tacho stays
+    says = ["has no channel 'acc_z'; choose one of acc_x, acc_y, tacho"]
+    refused("report", small_set, "--record", 7, *common, "--channels", "acc_z", says=says)
     plain = run("report", path, *common, *declared[:4], code=2).stdout
     assert "Unusable recording: no grade is given" in plain
     assert "its channel tacho is not named as its tacho; give --tacho tacho" in plain

@@ -113,6 +113,7 @@ def test_a_data_set_by_record(tmp_path):
         for i in (0, 1):
             writer.write(i, np.full((1, 3), i), {"record_id": str(i), "status": "ok"})
         writer.finish()
+    assert read(path, channels=["x=a"]).names == ("x",)
     item = read(path, record=1, fs=10.0)
     assert_array_equal(item.signal, np.ones((1, 3)))
     assert (item.origin, item.row["record_id"]) == ("simulated", "1")
@@ -121,6 +122,8 @@ def test_a_data_set_by_record(tmp_path):
         ({"fs": 11.0}, "fs = 11 Hz must be 10 Hz"),
         ({"unit": "g", "variable": "x"}, "variable, unit must not be given"),
         ({"tacho": "a"}, "tacho = 'a' must be None"),
+        ({"channels": ["b"]}, "has no channel 'b'; choose one of a"),
+        ({"channels": ["a", "a"]}, "channels = a, a must differ"),
     ):
         with pytest.raises(DataError, match=message):
             read(path, **options)

@@ -234,6 +234,7 @@ def test_one_recording_keeps_severity_speed_and_grade(tmp_path):
     with DataSet(path) as found:
         row, head = found.manifest.iloc[0], found.attributes
     assert (row["grade"], row["speed_hz"]) == (1, 50.0)
+    assert (row["static_load_n"], row["viscosity_pa_s"]) == (5000.0, 0.03)
     assert row[CLEARANCE] == pytest.approx(0.2e-3)
     assert head.condemning_limit == pytest.approx(0.2413e-3)
 

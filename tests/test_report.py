@@ -307,6 +307,32 @@ def test_an_alarm_of_the_other_model_is_one_of_the_command(model_file, tmp_path,
     assert "Grade 1 of 3" in run(*args, "--also", "other.wsm", code=4).output
 
 
+def test_a_channel_too_many_is_left_out_as_the_verdict_says(model_file, tmp_path):
+    """A data set refused the very option that its verdict asked for."""
+    extra = Channel(name="pressure", unit="Pa", quantity="pressure")
+    head = Attributes(
+        sample_rate=FS,
+        channels=(CHANNELS[0], extra, CHANNELS[1]),
+        origin="measured",
+        tacho="tacho",
+    )
+    path = tmp_path / "three.h5"
+    with DataSetWriter(path, head, n_records=2, n_samples=N) as writer:
+        for i in range(2):
+            acc, tacho = knocking(2.5e-4, i)
+            row = {"record_id": str(i), "group": 0, "status": "ok"}
+            writer.write(i, np.stack([acc, 0 * acc, tacho]), row)
+        writer.finish()
+    said = run("report", path, "--record", 0, "--model", model_file, code=2).output
+    assert "give --channels acc" in said
+    chosen = ("--model", model_file, "--channels", "acc")
+    assert "no grade" not in run("report", path, "--record", 0, *chosen).output
+    assert "no grade" not in run("report", path, *chosen).output  # many
+    (tmp_path / "folder").mkdir()
+    path.rename(tmp_path / "folder" / "three.h5")
+    assert "no grade" not in run("report", tmp_path / "folder", *chosen).output
+
+
 def test_what_the_other_model_was_trained_on_is_no_longer_unseen(model):
     """Only if it gives an estimate."""
     trained = {"scene": "bilge-pump", "recipe": "bilge-pump-standard"}

@@ -29,7 +29,7 @@ from ..file.lock import holding
 from ..file.record import unfinished_attributes
 from ..file.writer import DataSetWriter, LostError, WriteError, refuse_output
 from ..recipe.load import load_recipe
-from ..recipe.recipe import Recipe, condition_of
+from ..recipe.recipe import Recipe, condition_of, conditions_of
 from ..recipe.records import LARGEST_SEED, Sample, overrides_text, sample_records
 from ..recipe.severities import clearances, wear_limits
 from ..recipe.table import MOST_RECORDS
@@ -504,7 +504,7 @@ def save_solution(
         "record_id": "0",
         "seed": seed,
         "status": solution.status.name.lower(),
-        "speed_hz": condition_of(scene, "speed_hz"),
+        **(conditions := {name: condition_of(scene, name) for name in conditions_of(scene)}),
         **severity,
         **numerics_of(solution),
     }
@@ -521,7 +521,7 @@ def save_solution(
         truth=truth,
         **limits,
     )
-    columns = {**dict.fromkeys((*severity, "speed_hz"), "<f8"), **NUMERICS}
+    columns = {**dict.fromkeys((*severity, *conditions), "<f8"), **NUMERICS}
     n_samples = solution.signal.shape[1]
     writer = DataSetWriter(
         path,

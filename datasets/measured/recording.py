@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from ..file.hdf5_values import HDF5_FAULTS
 from ..file.record import LARGEST_RECORD, DataSet
 from ..file.views import CompletingView, JoinedSet, joined_recordings
 from ..readers.open import list_sources, open_source
+from ..source.chosen import new_and_old
 from ..source.part import Source, SourceOptions
 from .label_table import refusal
 from .plan import channels_of_source, sparing_tacho
@@ -132,7 +133,7 @@ def _of_data_set(file: Path, options: SourceOptions, tacho: str | None) -> Recor
     wrong = [
         field.name
         for field in fields(SourceOptions)
-        if field.name not in ("record", "fs")
+        if field.name not in ("record", "fs", "channels")
         and getattr(options, field.name) != getattr(default, field.name)
     ]
     with DataSet(file) as data:
@@ -148,7 +149,54 @@ def _of_data_set(file: Path, options: SourceOptions, tacho: str | None) -> Recor
             )
         if faults:
             raise DataError("\n".join(f"{file}: {fault}" for fault in faults))
-        return data[options.record]
+        return chosen_channels(data[options.record], options.channels)
+
+
+def chosen_channels(recording: Recording, entries: Sequence[str]) -> Recording:
+    """Some channels of a recording in a given order, and its tacho.
+
+    Parameters
+    ----------
+    recording : Recording
+    entries : sequence of str
+        Names, or ``NEW=OLD`` to rename a channel; none for all.
+
+    Raises
+    ------
+    DataError
+        A channel does not exist, or two get the same name.
+
+    Examples
+    --------
+    >>> three = Recording.from_array(np.zeros((3, 8)), 1e3, channels=["x", "p", "key"], tacho="key")
+    >>> chosen_channels(three, ["acc=x"]).names
+    ('acc', 'key')
+    """
+    if not entries:
+        return recording
+    old = {new: before or new for new, before in map(new_and_old, entries)}
+    if recording.tacho is not None and recording.tacho not in old.values():
+        old.setdefault(recording.tacho, recording.tacho)
+    names = recording.names
+    faults = [
+        f"{recording.source}: has no channel '{name}'; choose one of {', '.join(names)}"
+        for name in old.values()
+        if name not in names
+    ]
+    if len({*map(new_and_old, entries)}) < len(entries) or len(old) < len(entries):
+        faults.append(
+            f"{recording.source}: channels = {', '.join(entries)} must differ; rename one"
+        )
+    if faults:
+        raise DataError("\n".join(faults))
+    rows = [names.index(name) for name in old.values()]
+    new = {before: name for name, before in old.items()}
+    return replace(
+        recording,
+        signal=recording.signal[rows],
+        channels=tuple(replace(recording.channels[i], name=new[names[i]]) for i in rows),
+        tacho=None if recording.tacho is None else new[recording.tacho],
+    )
 
 
 def _refuse_long(source: Source) -> None:

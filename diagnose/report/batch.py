@@ -17,7 +17,7 @@ from ... import __version__
 from ...datasets.file.machines import GROUP_NAME
 from ...datasets.file.record import DataSet
 from ...datasets.file.views import CompletingView, JoinedSet
-from ...datasets.measured.recording import read_recording
+from ...datasets.measured.recording import chosen_channels, read_recording
 from ...datasets.readers.open import READERS
 from ...datasets.source.part import SourceOptions
 from ...sim.output.recording import DataError, Recording
@@ -240,14 +240,15 @@ def recordings_in(
     read = partial(
         read_recording, options=options, tacho=tacho, pulses_per_revolution=pulses_per_revolution
     )
+    chosen = options.channels if options else ()
     if not path.is_dir():
         read(path)  # refuses options that contradict what the data set declares
         with JoinedSet(path, tuple(views)) as data:
-            yield tuple(_records(path, data))
+            yield tuple(_records(path, data, chosen))
         return
     spared = {file.resolve() for file in leave_out}
     files = [file for file in _recording_files(path) if file.resolve() not in spared]
-    items = tuple(item for file in files for item in _items_of(file, read))
+    items = tuple(item for file in files for item in _items_of(file, read, chosen))
     if not items:
         known = ", ".join(sorted(set(READERS) - set(_NO_RECORDINGS)))
         raise DataError(f"{path} holds 0 recordings, must hold >= 1; put in {known}")
@@ -265,18 +266,20 @@ def _recording_files(folder: Path) -> list[Path]:
     )
 
 
-def _items_of(file: Path, read: Callable[[Path], Recording]) -> list[Item]:
+def _items_of(file: Path, read: Callable[[Path], Recording], chosen: Sequence[str]) -> list[Item]:
     """Every record of a data set; one item for any other file, readable or not."""
     if file.suffix.lower() in _DATA_SETS:
         try:
             with JoinedSet(file) as data:  # closed: the number of open files is limited
-                return _records(file, data, close=True)
+                return _records(file, data, chosen, close=True)
         except DataError:
             pass  # from another program, or damaged: reading it raises the right error
     return [Item(name=file.name, machine="", path=file, row={}, load=partial(read, file))]
 
 
-def _records(file: Path, data: JoinedSet, *, close: bool = False) -> list[Item]:
+def _records(
+    file: Path, data: JoinedSet, chosen: Sequence[str], *, close: bool = False
+) -> list[Item]:
     several = data.data.manifest["group"].nunique() > 1
     return [
         Item(
@@ -284,16 +287,16 @@ def _records(file: Path, data: JoinedSet, *, close: bool = False) -> list[Item]:
             machine=str(row.get(GROUP_NAME, row["group"])) if several else "",
             path=file,
             row=row,
-            load=partial(_read_record, data, i, close=close),
+            load=partial(_read_record, data, i, chosen, close=close),
         )
         for i, row in enumerate(_manifest_rows(data.data))
     ]
 
 
-def _read_record(data: JoinedSet, index: int, *, close: bool) -> Recording:
-    """One record; a closed data set opens by itself."""
+def _read_record(data: JoinedSet, index: int, chosen: Sequence[str], *, close: bool) -> Recording:
+    """One record with the channels chosen; a closed data set opens by itself."""
     try:
-        return data[index]
+        return chosen_channels(data[index], chosen)
     finally:
         if close:
             data.close()
