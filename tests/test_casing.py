@@ -32,8 +32,15 @@ def housing_acceleration(forces, fs, modes):
     """[m/s^2, shape=(n_outputs, n_samples)] of forces that are linear between samples."""
     as_they_are = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # no loss of straight lines made up
     casing = _ModesInMotion(modes, as_they_are, fs)
-    found = [casing.add(piece) for piece in pieces(forces.T)]
-    return np.hstack([*found, casing.finish()])
+    found = []
+
+    def response(n):
+        return np.empty((modes.outputs.shape[1], n))
+
+    for piece in pieces(forces.T):
+        casing.room(piece.shape[1])[:] = piece
+        found.append(casing.take(piece.shape[1], response))
+    return np.hstack([*found, casing.finish(response)])
 
 
 def one_mode(forces, frequency=388.0, damping_ratio=0.025, shape=1.0, fs=FS):

@@ -1,6 +1,7 @@
 """Workers: results in the order of the work, few in flight, lost processes replaced."""
 
 import gc
+import importlib
 import logging
 import os
 import signal
@@ -10,7 +11,8 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future, wait
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import partial
 from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -182,6 +184,12 @@ class _Processes:
         self._say, self._watch = say, watch
         self._ahead: deque[tuple[Any, Future[Any]]] = deque()
         self._start()
+        self._start_early()
+
+    def _start_early(self) -> None:
+        """Start the processes now: they import while the first items are being made."""
+        with suppress(BrokenExecutor):  # reported by take, where attempts are counted
+            self._executor.submit(os.getpid)
 
     def _start(self) -> None:
         from joblib.externals.loky import get_reusable_executor
@@ -195,7 +203,7 @@ class _Processes:
             timeout=IDLE,
             env={**_ONE_THREAD, _SAFE_PATH: "1"},
             initializer=_settle,
-            initargs=(os.getpid(),),
+            initargs=(os.getpid(), _module_of(self._function)),
         )
 
     @property
@@ -290,15 +298,24 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def _settle(parent: int) -> None:
-    """Start a worker."""
+def _module_of(function: Any) -> str:
+    """Module that a worker imports to call a function."""
+    while isinstance(function, partial):
+        function = function.func
+    return str(getattr(function, "__module__", type(function).__module__))
+
+
+def _settle(parent: int, module: str) -> None:
+    """Start a worker for functions of a module."""
     # Ctrl-C reaches all processes of the terminal; the writing one ends the others
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # the parent has already reported faults of the kernel cache
     logging.getLogger(f"{__name__.partition('.')[0]}.sim.jit").setLevel(logging.ERROR)
+    threading.Thread(target=_follow, args=(parent,), daemon=True).start()
+    with suppress(ImportError):  # a function may be sent as code
+        importlib.import_module(module)
     # loky collects garbage once a second; over all imported objects that is 8 % of a run
     gc.freeze()
-    threading.Thread(target=_follow, args=(parent,), daemon=True).start()
 
 
 def _follow(parent: int) -> None:

@@ -113,17 +113,25 @@ class Decimation:
         self._done = 0
         self._advance = _KEPT * factor
         self._span = self._phases.size + self._advance  # steps that a block of samples depends on
-        self._window = np.zeros((n_rows, self._span + max(PIECE, self._advance)))
+        self._window = np.zeros((n_rows, self._span + max(PIECE + BLOCK, self._advance)))
         self._filled = edge_samples(factor) * factor  # zeros before the first step
         self._scratch = np.empty(_KEPT + self._phases.shape[1]), np.empty(_KEPT)
 
     def add(self, rows: NDArray[np.float64]) -> None:
         """Add the next steps [shape=(n_rows, n)]."""
         for piece in pieces(rows):
-            end = self._filled + piece.shape[1]
-            self._window[:, self._filled : end] = piece
-            self._filled = end
-            self._keep()
+            n = piece.shape[1]
+            self.room(n)[:] = piece
+            self.take(n)
+
+    def room(self, n: int) -> NDArray[np.float64]:
+        """Buffer for the next n steps, at most ``PIECE + BLOCK`` [shape=(n_rows, n)]."""
+        return self._window[:, self._filled : self._filled + n]
+
+    def take(self, n: int) -> None:
+        """Like :meth:`add`, for n steps already written into :meth:`room`."""
+        self._filled += n
+        self._keep()
 
     def _keep(self) -> None:
         blocks = max(0, (self._filled - self._span) // self._advance + 1)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -59,14 +59,13 @@ def exact_oscillator(
     a = damping_ratio * w
     decay = math.exp(-a * step)
     cos, sin = decay * math.cos(wd * step), decay * math.sin(wd * step)
-    transition = np.array(
-        [[cos + a / wd * sin, sin / wd], [-(w**2) / wd * sin, cos - a / wd * sin]]
-    )
+    stay, pull = cos + a / wd * sin, sin / wd
+    transition = np.array([[stay, pull], [-(w**2) / wd * sin, cos - a / wd * sin]])
     # responses from rest to a unit step and to a unit ramp, the integral of the former
-    step_q, step_v = (1 - transition[0, 0]) / w**2, transition[0, 1]
+    step_q, step_v = (1 - stay) / w**2, pull
     ramp_q, ramp_v = (step - step_v - 2 * a * step_q) / w**2, step_q
-    slope = np.array([ramp_q, ramp_v]) / step
-    return transition, np.column_stack([np.array([step_q, step_v]) - slope, slope])
+    slope_q, slope_v = ramp_q / step, ramp_v / step
+    return transition, np.array([[step_q - slope_q, slope_q], [step_v - slope_v, slope_v]])
 
 
 @kernel_noalias
@@ -349,7 +348,6 @@ class _ModesInMotion:
         self._window = np.empty((n_inputs, PIECE + 2 * (BLOCK + _REACH)))
         self._filled = 0
         self._fresh = True
-        self._n_outputs = n_outputs
         # zeros up to the even numbers that the loops take
         more_modes, more_outputs = len(turns) % 2, max(2, n_outputs + n_outputs % 2) - n_outputs
         more_inputs = max(4, n_inputs + n_inputs % 2) - n_inputs
@@ -377,38 +375,37 @@ class _ModesInMotion:
             np.zeros((outputs.shape[1], _ROW)),
         )
 
-    def add(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Add at most ``PIECE`` steps; return the acceleration of the steps completed by now."""
-        self.room(forces.shape[1])[:] = forces
-        return self.take(forces.shape[1])
-
     def room(self, n: int) -> NDArray[np.float64]:
         """Buffer for the next n steps' forces, at most ``PIECE``."""
         first = self._filled or _REACH
         return self._window[:, first : first + n]
 
-    def take(self, n: int) -> NDArray[np.float64]:
-        """Like :meth:`add`, for n steps already written into :meth:`room`."""
+    def take(self, n: int, response: Callable[[int], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Take n steps written into :meth:`room`.
+
+        Returns the acceleration of the steps completed by now, in the array [shape=(n_outputs, n)]
+        that `response` gives for their number, at most ``PIECE + BLOCK``.
+        """
         if not self._filled:
             self._window[:, :_REACH] = self._window[:, _REACH : _REACH + 1]
             self._filled = _REACH
         end = self._filled + n
-        known = (end - 2 * _REACH) // BLOCK * BLOCK
-        acceleration = np.empty((self._n_outputs, max(0, known)))
-        if known > 0:
+        known = max(0, (end - 2 * _REACH) // BLOCK * BLOCK)
+        acceleration = response(known)
+        if known:
             _respond(self._window, self._fresh, acceleration, *self._told)
             self._window[:, : end - known] = self._window[:, known:end]
             self._fresh, end = False, end - known
         self._filled = end
         return acceleration
 
-    def finish(self) -> NDArray[np.float64]:
-        """Return the acceleration of the remaining steps, with constant last forces."""
+    def finish(self, response: Callable[[int], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Like :meth:`take`, for the remaining steps, with constant last forces."""
         left = self._filled - _REACH
         last = self._window[:, self._filled - 1 : self._filled]
         more = -(-left // BLOCK) * BLOCK + 2 * _REACH - self._filled
         self.room(more)[:] = last
-        return self.take(more)[:, :left]
+        return self.take(more, response)[:, :left]
 
 
 class ModalCasing:
@@ -445,16 +442,16 @@ class ModalCasing:
     def add(self, means: NDArray[np.float64]) -> None:
         """Add the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
         for piece in pieces(means):
-            self._low.add(self._modes.add(piece))
+            self.fill(piece.shape[1], partial(np.copyto, src=piece))
 
     def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
         """Like :meth:`add`, for at most ``PIECE`` steps, written directly into the buffer."""
         write(self._modes.room(n))
-        self._low.add(self._modes.take(n))
+        self._low.take(self._modes.take(n, self._low.room).shape[1])
 
     def finish(self) -> NDArray[np.float64]:
         """Acceleration [shape=(n_outputs, n_steps // factor)] [m/s^2], after the last step."""
-        self._low.add(self._modes.finish())
+        self._low.take(self._modes.finish(self._low.room).shape[1])
         return self._low.finish()
 
 

@@ -171,13 +171,11 @@ def bearing_shapes(scene: PumpScene) -> NDArray[np.float64]:
     ndarray of shape (n_modes, 2)
         Mass-normalised, along the stroke and across it [kg^-0.5].
     """
-    throws = range(1, len(scene.throws) + 1)
-    return np.array(
-        [
-            [np.mean([casing_inputs(mode.shape, place, k) for k in throws]) for place in _BEARING]
-            for mode in scene.casing.modes
-        ]
-    )
+    throws, modes = range(1, len(scene.throws) + 1), scene.casing.modes
+    shapes = [
+        casing_inputs(mode.shape, place, k) for mode in modes for place in _BEARING for k in throws
+    ]
+    return np.asarray(np.reshape(shapes, (len(modes), 2, len(throws))).mean(axis=-1))
 
 
 def bearing_mass_ratios(scene: PumpScene) -> dict[str, float]:
