@@ -1,7 +1,8 @@
 """Small neural networks of severity: smooth as a line, and bent where the features bend.
 
-They see a recording as some hundred principal directions of its features. What is fitted is plain
-arrays, asked with numpy alone.
+They see a recording as some hundred principal directions of its features, each weighted by its
+importance for the target: otherwise hundreds of bands fill the directions and hide the few features
+that matter. What is fitted is plain arrays, asked with numpy alone.
 """
 
 from dataclasses import dataclass
@@ -12,10 +13,14 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 
-FEWEST_RECORDS = 500
-"""Records from which a net is worth its training: of fewer it learns no more than a ridge."""
+FEWEST_RECORDS = 150
+"""Records from which a network is worth its training: of fewer it learns no more than trees."""
 
-_DIRECTIONS = 150
+_DIRECTIONS = 300
+_TREES = 60  # of the forest that finds the importance of the features
+_LEAF = 5  # records in each of its leaves, at least
+_TRIED = 0.1  # share of the features that are tried at each of its nodes
+_RECORDS = 3000  # that it sees, at most: more change no importance that matters
 _HIDDEN = (128, 32)
 _NETS = 4
 _PENALTY = 0.1
@@ -34,8 +39,9 @@ class Nets:
     centre, spread : numpy.ndarray [shape=(n_features,)]
         Features are taken as deviations, within +-4.
     direction : numpy.ndarray [shape=(n_features, n_directions)]
-        Principal directions of the features, scaled so that the first has one deviation over the
-        training records, then a direction for each noted condition.
+        Principal directions of the features weighted by their importances, scaled so that
+        the first has one deviation over the training records, then a direction for each noted
+        condition.
     first, second, last : numpy.ndarray [shape=(n_nets, n_directions, n_1), (n_nets, n_1, n_2), \
 (n_nets, n_2)]
         Weights.
@@ -97,13 +103,13 @@ def fit_nets(rows: Float, moved: Float, target: Float, seed: int, noted: int) ->
 
     scaler = StandardScaler().fit(rows)
     here = deviations(rows, scaler.mean_, scaler.scale_)
-    direction = _directions(here, noted)
+    level = np.log(target)
+    offset, scale = float(level.mean()), float(level.std()) or 1.0
+    direction = _directions(here, _importances(here, level, seed), noted)
     there = deviations(moved, scaler.mean_, scaler.scale_)
     # a resonance elsewhere changes nothing of what was noted
     there[:, there.shape[1] - noted :] = here[:, here.shape[1] - noted :]
     seen = np.vstack([here, there]) @ direction
-    level = np.log(target)
-    offset, scale = float(level.mean()), float(level.std()) or 1.0
     taught = np.tile((level - offset) / scale, 2)
     nets = [_net(seen, taught, seed + i) for i in range(_NETS)]
 
@@ -125,16 +131,32 @@ def fit_nets(rows: Float, moved: Float, target: Float, seed: int, noted: int) ->
     )
 
 
-def _directions(deviation: Float, noted: int) -> Float:
-    """Principal directions of the features, and the noted conditions as they are."""
+def _importances(deviation: Float, level: Float, seed: int) -> Float:
+    """Importance of each column for the logarithm of the target, by a forest of random splits."""
+    from sklearn.ensemble import ExtraTreesRegressor
+
+    records = np.random.default_rng(seed).permutation(len(deviation))[:_RECORDS]
+    forest = ExtraTreesRegressor(
+        _TREES, min_samples_leaf=_LEAF, max_features=_TRIED, random_state=seed
+    ).fit(deviation[records], level[records])
+    return np.asarray(forest.feature_importances_)
+
+
+def _directions(deviation: Float, importance: Float, noted: int) -> Float:
+    """Principal directions of the weighted features, and the noted conditions as they are."""
     from sklearn.decomposition import PCA
 
     features = deviation.shape[1] - noted
+    # the variance of a feature is its importance, if any has one
+    known = importance[:features]
+    weight = np.sqrt(known) if known.any() else np.ones(features)
     count = min(_DIRECTIONS, features, len(deviation) // 2)
-    found = PCA(count, svd_solver="covariance_eigh").fit(deviation[:, :features])
+    weighted = deviation[:, :features] * weight
+    found = PCA(count, svd_solver="covariance_eigh").fit(weighted)
     direction = np.zeros((features + noted, count + noted))
     # not whitened: what the directions of small variance hold is noise for the most part
-    direction[:features, :count] = found.components_.T / np.sqrt(found.explained_variance_[0])
+    scaled = found.components_.T / np.sqrt(found.explained_variance_[0])
+    direction[:features, :count] = weight[:, None] * scaled
     direction[features:, count:] = np.eye(noted)
     return direction
 

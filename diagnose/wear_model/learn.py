@@ -33,7 +33,6 @@ from ..learning.regressions import (
     WITNESSES,
     Fitted,
     Folds,
-    RegressionCandidate,
     fit_blend,
     fit_line,
 )
@@ -139,7 +138,7 @@ def learn(
     return Learnt(
         severity=severity,
         blind=_estimator(training, training.inputs, severity, apart, seed),
-        informed=_informed(training, other, severity, folds, apart, heads, seed),
+        informed=_informed(training, other, severity, folds, apart, heads, seed, budget_ms),
         familiarity=fit_familiarity(training.names, training.rows, training.groups, **limits),
         levels=fit_levels(training.names, training.rows, folds),
         heads=tuple((one.head, _rates(one, training, severity.estimate, as_new)) for one in heads),
@@ -178,7 +177,6 @@ def _severity(
     heads: Sequence[FittedHead],
     seed: int,
     budget_ms: float | None,
-    candidates: Sequence[RegressionCandidate] = CANDIDATES,
     noted: int = 0,
 ) -> SeverityFit:
     """One fit for all records, or one for each regime where that errs less."""
@@ -191,7 +189,6 @@ def _severity(
             folds,
             seed=seed,
             budget_ms=limit / parts,
-            candidates=candidates,
             shifted=moved,
             learnt_from=records,
             noted=noted,
@@ -199,7 +196,7 @@ def _severity(
 
     one = fit(None, 1)
     gates = _gates(training, heads)
-    if not gates or limit / len(gates) < min(each.cost_ms for each in candidates):
+    if not gates or limit / len(gates) < min(each.cost_ms for each in CANDIDATES):
         return one
     present = [training.faults[gate.head.name] for gate in gates]
     first, features = training.first_feature, len(training.names)
@@ -264,10 +261,12 @@ def _informed(
     apart: tuple[Float, Float],
     heads: Sequence[FittedHead],
     seed: int,
+    budget_ms: float | None,
 ) -> Estimator | None:
-    """The kinds of parts that do well without the conditions, fitted again with them.
+    """The estimate with the conditions, as uncertain as people know them.
 
-    They are as uncertain as people know them. None where they are not worth the asking.
+    None where they are not worth the asking. Which parts do well without the conditions says little
+    of those that do well with them: only then the error is small enough to tell parts apart.
     """
     if not training.conditions:
         return None
@@ -277,10 +276,8 @@ def _informed(
     noted = doubted(training.conditions, noted, seed)
     inputs = np.hstack([training.inputs, noted])
     moved = np.hstack([other.inputs, strayed(training.conditions, noted, seed, REACH)])
-    kept = {*blind.blend.names, *WITNESSES}
-    kinds = [each for each in CANDIDATES if each.name in kept]
     count = len(training.conditions)
-    fitted = _severity(training, inputs, moved, folds, heads, seed, None, kinds, count)
+    fitted = _severity(training, inputs, moved, folds, heads, seed, budget_ms, noted=count)
     if not _worth_asking(training, fitted.estimate, blind.estimate):
         return None
     return _estimator(training, inputs, fitted, apart, seed)
