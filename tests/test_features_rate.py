@@ -56,6 +56,7 @@ VALUES = {
 """An argument for every name."""
 
 OTHER = {
+    "array_signals": {"channel_names": ("a", "b")},
     "multiple_h1": {"force": _RNG.standard_normal((2, N))},
     "other_rate": {"x": _RNG.standard_normal((1, N))},
     "transmissibility": {"x": _RNG.standard_normal((2, N))},

@@ -182,7 +182,7 @@ def test_bare_numbers_are_si(number):
         ("mm", "has no leading number"),
         ("", "has no leading number"),
         ("nan mm", "has no leading number"),
-        ("1,5 mm", "has unit ',5 mm'"),
+        ("1,5 mm", "has a decimal comma; write '1.5 mm'"),
         (True, "is not a number or a string with a unit"),
         (None, "is not a number"),
         ([1.0], "is not a number"),
