@@ -4,7 +4,7 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,6 +33,10 @@ class SweepError(ValueError):
     def __init__(self, faults: Sequence[str]) -> None:
         self.faults = list(dict.fromkeys(faults))
         super().__init__("\n".join(self.faults))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[list[str]]]:
+        """How it leaves a worker process."""
+        return type(self), (self.faults,)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,7 @@
 """How the search for an equilibrium of a journal bearing ends."""
 
+from typing import Self
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,4 +41,9 @@ class BearingError(RuntimeError):
 
     def __init__(self, status: BearingStatus, where: str) -> None:
         self.status = status
+        self.where = where
         super().__init__(f"{where}: {status.name.lower()}: {status.text}")
+
+    def __reduce__(self) -> tuple[type[Self], tuple[BearingStatus, str]]:
+        """How it leaves a worker process."""
+        return type(self), (self.status, self.where)

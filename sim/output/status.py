@@ -147,4 +147,9 @@ class SimulationError(RuntimeError):
 
     def __init__(self, status: Status, where: str) -> None:
         self.status = status
+        self.where = where
         super().__init__(f"{where}: {status}")
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Status, str]]:
+        """How it leaves a worker process."""
+        return type(self), (self.status, self.where)

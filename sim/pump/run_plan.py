@@ -1,6 +1,7 @@
 """Length and steps of a pump's run, or why it is refused."""
 
 import math
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,10 @@ class LimitError(SceneError):
     def __init__(self, name: str, faults: list[str], status: Status) -> None:
         self.status = status
         super().__init__(name, faults)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        """How it leaves a worker process."""
+        return type(self), (self.name, self.faults, self.status)
 
 
 def steps_per_sample(scene: PumpScene) -> int:

@@ -32,8 +32,13 @@ class SceneError(ValueError):
     """All faults of one scene, one line each, as dotted path, value, bound and cure."""
 
     def __init__(self, name: str, faults: list[str]) -> None:
+        self.name = name
         self.faults = faults
         super().__init__("\n".join([f"{name}: {len(faults)} fault(s)", *faults]))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        """How it leaves a worker process."""
+        return type(self), (self.name, self.faults)
 
 
 class Wear(Part):

@@ -1,5 +1,7 @@
 """How the search for the equilibrium of shaft and films ended, with the cure."""
 
+from typing import Self
+
 from ..output.status import Ending
 
 
@@ -41,3 +43,7 @@ class ShaftFilmError(RuntimeError):
         self.status = status
         self.bearing = bearing
         super().__init__(f"bearing '{bearing}': {status.name.lower()}: {status.text}")
+
+    def __reduce__(self) -> tuple[type[Self], tuple[ShaftFilmStatus, str]]:
+        """How it leaves a worker process."""
+        return type(self), (self.status, self.bearing)
