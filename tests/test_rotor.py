@@ -104,6 +104,7 @@ def test_damped_rotor_of_friswell():
     assert found.direction == ("backward", "forward", "backward", "forward", "backward")
     assert (found.damping_ratio > 0.02).all()
     zeta = found.damping_ratio
+    assert_allclose(found.log_decrement, HERTZ * zeta / np.sqrt(1 - zeta**2), rtol=1e-14)
     bare = found.undamped_frequency_hz
     assert_allclose(found.frequency_hz, bare * np.sqrt(1 - zeta**2), rtol=1e-12)
 
@@ -330,6 +331,9 @@ def test_one_degree_of_freedom():
     pairs.sort()
     assert_allclose(found.undamped_frequency_hz * HERTZ, [p[0] for p in pairs], rtol=BENDS)
     assert_allclose(found.damping_ratio, [p[1] for p in pairs], rtol=BENDS)
+    assert_allclose(
+        found.log_decrement, [HERTZ * p / math.sqrt(1 - p * p) for _, p in pairs], rtol=BENDS
+    )
 
 
 def test_housing_on_its_pedestal_in_closed_form():

@@ -90,6 +90,12 @@ class RotorModes(Vibrations):
     __repr__ = brief("speed", "frequency_hz", "stable")
 
     @property
+    def log_decrement(self) -> Vector:
+        """Logarithmic decrement of each mode, ``2 pi zeta / sqrt(1 - zeta^2)``."""
+        zeta = self.damping_ratio
+        return 2 * math.pi * zeta / np.sqrt(1 - zeta**2)
+
+    @property
     def direction(self) -> tuple[str, ...]:
         """Direction of each mode: "forward", "backward", "planar", or "mixed" if nodes differ."""
         return tuple(direction_of(ratios) for ratios in self.axis_ratio.T)
