@@ -405,6 +405,8 @@ def evidence_words(
     --------
     >>> evidence_words("acc_x.order_02.level_db", -8.0, -14.0)
     '6.0 dB stronger: 2.0 times the amplitude'
+    >>> evidence_words("acc_x.order_02.level_db", -50.4, -14.0)
+    '36.4 dB weaker: 0.015 times the amplitude'
     >>> evidence_words("acc_x.rms", 12.0, 6.0, {"acc_x": "m/s^2"})
     '12 m/s² instead of 6'
     >>> evidence_words("p.discharge", 3.5e5, 3.1e5, {"p": "Pa"})
@@ -494,6 +496,9 @@ def _arc(left: Sequence[int], right: Sequence[int]) -> tuple[int, int]:
 
 
 def _times(ratio: float) -> str:
+    """A ratio to two digits, or whole from 10 on."""
+    if ratio < 1:
+        return f"{ratio:.2g}"
     return f"{ratio:.1f}" if ratio < 10 else f"{ratio:.0f}"
 
 
