@@ -7,9 +7,11 @@ import numpy as np
 from click.testing import CliRunner
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages.picture import PHONE_PX
+from wearstate.diagnose.report.advice import Advice
 from wearstate.diagnose.report.batch import BatchRow
 from wearstate.diagnose.report.figures import gauge, trend_picture
 from wearstate.diagnose.report.trend import fit_trend
+from wearstate.diagnose.wear_model.verdict import Estimate
 
 
 def test_the_gauge_and_a_trend_are_read_on_a_phone():
@@ -48,19 +50,22 @@ def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
 
 
 def test_what_cannot_wait_is_before_what_is_worse():
-    soon = BatchRow(
-        number=0, name="a", machine="1", time_h=None, headline="", verdict="graded", grade=3,
-        severity=4e-4, low=3.9e-4, high=4.1e-4, possible_grades=(3,), action="stop", advice="",
-        horizon="now", days=0.0, note="",
-    )  # fmt: skip
-    worse = dataclasses.replace(soon, name="b", severity=5e-4, horizon="within a day", days=1.0)
-    worn = dataclasses.replace(worse, name="c", grade=1, severity=1e-4, days=30.0)
-    unread = dataclasses.replace(soon, name="d", grade=None, verdict="unusable", days=None)
+    def row(name, days, *, verdict="graded", grade=3, severity=4e-4):
+        return BatchRow(
+            number=0, name=name, machine="1", time_h=None,
+            estimate=Estimate(verdict=verdict, grade=grade, severity=severity),
+            advice=Advice(action="stop", sentence="", days=days, horizon="", basis=""),
+        )  # fmt: skip
+
+    soon = row("a", 0.0)
+    worse = row("b", 1.0, severity=5e-4)
+    worn = row("c", 30.0, grade=1, severity=1e-4)
+    unread = row("d", None, verdict="unusable", grade=None)
     past = dataclasses.replace(soon, name="e", current=False, time_h=5.0)
     rows = sorted([past, worn, unread, worse, soon], key=lambda row: row.urgency)
     assert [row.name for row in rows] == ["a", "b", "d", "c", "e"]
-    same = [dataclasses.replace(worse, name="f", severity=s) for s in (4e-4, 6e-4)]
-    assert sorted(same, key=lambda row: row.urgency)[0].severity == 6e-4
+    same = [row("f", 1.0, severity=s) for s in (4e-4, 6e-4)]
+    assert sorted(same, key=lambda row: row.urgency)[0].estimate.severity == 6e-4
 
 
 def test_the_films_table_may_wrap_its_pairs(tmp_path):

@@ -675,9 +675,9 @@ def test_each_machine_of_a_batch_has_its_own_baseline(referenced, tmp_path):
         alone = model.estimate(items[1].load(), baselines.of(items[1].load()))
         own, other = (baselines.of(item.load()) for item in items[:2])
     rows = {row.machine: row for row in batch.rows}
-    assert rows["5"].severity == alone.severity
+    assert rows["5"].estimate.severity == alone.severity
     assert not np.array_equal(own.features, other.features)
-    assert rows["60"].verdict == "unusable"
+    assert rows["60"].estimate.verdict == "unusable"
     assert "must have some of machine 60" in rows["60"].note
     assert "some.h5[1]" in shown(page)
 
@@ -804,16 +804,15 @@ def test_a_broken_file_is_a_row_and_stops_nothing(model, folder):
         batch = judge_all(folder, items, model)
         page = batch_html(batch, model)
     names = [row.name for row in batch.rows]
-    assert batch.rows[0].severity == max(row.severity or 0 for row in batch.rows)
+    estimates = [row.estimate for row in batch.rows]
+    assert estimates[0].severity == max(each.severity or 0 for each in estimates)
     broken = batch.rows[names.index("cut.h5")]
-    assert (broken.verdict, broken.grade) == ("unusable", None)
+    assert (broken.estimate.verdict, broken.estimate.grade) == ("unusable", None)
     assert broken.note.startswith("file cannot be read")
     assert batch.counts()["unusable"] == 1
     # what must be acted on, what could not be judged, what is fine
-    assert [row.grade >= 2 if row.grade is not None else None for row in batch.rows] == sorted(
-        [row.grade >= 2 if row.grade is not None else None for row in batch.rows],
-        key=[True, None, False].index,
-    )
+    urgent = [each.grade >= 2 if each.grade is not None else None for each in estimates]
+    assert urgent == sorted(urgent, key=[True, None, False].index)
     assert is_self_contained(page)
     assert page.count("<tr>") >= 11
     assert "cut.h5" in shown(page)
@@ -873,12 +872,13 @@ def test_with_times_only_the_latest_counts(model, tmp_path):
         timed = judge_all(data, items, model, dates="operating_hours")
         page = batch_html(timed, model)
     assert len(plain.current) == 6
-    assert max(row.grade for row in plain.current) == 3
+    assert max(row.estimate.grade for row in plain.current) == 3
     assert [row.name for row in timed.current] == ["life.h5[5]"]
-    assert timed.current[0].grade == 0
+    assert timed.current[0].estimate.grade == 0
     assert timed.rows[0] == timed.current[0]
     assert timed.trends[""].starts == (0, 3)
     assert "6 recordings; now: 1 as new" in shown(page)
+    assert "Worst: life.h5[5], 0 as new. No action" in shown(page)
     assert "3 usable recordings since the last maintenance" in shown(page)
     assert trend_points(timed, "", "the machine").moments == (1250.0,)  # between 1,000 and 1,500
 

@@ -340,7 +340,7 @@ def _report_many(task: _ReportTask) -> list[_Verdict]:
             save_page(page, task.output, force=task.force)
     if not task.as_json:
         click.echo(batch_text(batch) + (f"\nPage        {task.output}" if task.output else ""))
-    return [(row.verdict, row.grade) for row in batch.current]
+    return [(row.estimate.verdict, row.estimate.grade) for row in batch.current]
 
 
 def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:

@@ -23,7 +23,7 @@ from ...datasets.source.part import SourceOptions
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_table import Progress, is_regime, regime_words
 from ..film_clearance.clearance import FilmEstimate
-from ..healthy_reference.healthy import Baselines
+from ..healthy_reference.healthy import Baseline, Baselines
 from ..learning.grades import GRADE_NAMES, WARNING_GRADE
 from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate
@@ -79,18 +79,8 @@ class BatchRow:
     name, machine : str
     time_h : float or None
         Operating hours, or calendar hours since 1970 [h].
-    headline : str
-    verdict : str
-    grade : int or None
-    severity, low, high : float or None
-        [m]
-    possible_grades : tuple of int
-    action, advice, horizon : str
-        What to do and how soon.
-    days : float or None
-        The horizon as a number [d].
-    note : str
-        The first reason or caution.
+    estimate : Estimate
+    advice : Advice
     current : bool
         It shows the present state: only the latest recording of a machine if times are known.
     """
@@ -99,19 +89,34 @@ class BatchRow:
     name: str
     machine: str
     time_h: float | None
-    headline: str
-    verdict: str
-    grade: int | None
-    severity: float | None
-    low: float | None
-    high: float | None
-    possible_grades: tuple[int, ...]
-    action: str
-    advice: str
-    horizon: str
-    days: float | None
-    note: str
+    estimate: Estimate
+    advice: Advice
     current: bool = True
+
+    @property
+    def headline(self) -> str:
+        """The verdict in a few words."""
+        found = self.estimate
+        if found.grade is None:
+            return headline(found).split(":")[0]
+        sign = "?" if found.verdict == "caution" else ""
+        return f"{found.grade} {found.grade_name}{sign}"
+
+    @property
+    def point(self) -> tuple[float | None, ...]:
+        """Time [h], wear and its interval [m], as the trend needs them; None if unknown."""
+        return self.time_h, self.estimate.severity, self.estimate.low, self.estimate.high
+
+    @property
+    def note(self) -> str:
+        """Faults that are present, and the first reason or caution."""
+        found = self.estimate
+        present = [
+            regime_words(f.name) if is_regime(f.name) else f"{f.name.replace('_', ' ')} present"
+            for f in found.confounders
+            if f.present
+        ]
+        return "; ".join([*present, *(*found.reasons, *found.cautions)[:1]])
 
     @property
     def urgency(self) -> tuple[bool, int, float, float]:
@@ -122,10 +127,11 @@ class BatchRow:
         past = not self.current
         if past:
             return (past, 0, 0.0, -(self.time_h or 0.0))
-        if self.grade is None:
-            return (past, 1 if self.verdict == "unusable" else 2, 0.0, 0.0)
-        group = 0 if self.grade >= WARNING_GRADE else 3
-        return (past, group, self.days or 0.0, -(self.severity or 0.0))
+        found = self.estimate
+        if found.grade is None:
+            return (past, 1 if found.verdict == "unusable" else 2, 0.0, 0.0)
+        group = 0 if found.grade >= WARNING_GRADE else 3
+        return (past, group, self.advice.days or 0.0, -(found.severity or 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,10 +188,11 @@ class Batch:
     def counts(self) -> dict[str, int]:
         """Number of current recordings of each grade, worst first, and of those without a grade."""
         words = [(grade, GRADE_NAMES[grade]) for grade in reversed(range(len(GRADE_NAMES)))]
-        found = {name: sum(row.grade == grade for row in self.current) for grade, name in words}
+        estimates = [row.estimate for row in self.current]
+        found = {name: sum(each.grade == grade for each in estimates) for grade, name in words}
         alone = sum(row.headline == NO_REFERENCE for row in self.current)
         for verdict in ("unusable", "unfamiliar"):
-            found[verdict] = sum(row.verdict == verdict for row in self.current)
+            found[verdict] = sum(each.verdict == verdict for each in estimates)
         found["unusable"] -= alone
         return found | {"without healthy reference": alone}
 
@@ -194,7 +201,7 @@ class Batch:
         verdicts = ", ".join(f"{count} {name}" for name, count in self.counts().items() if count)
         past = len(self.rows) - len(self.current)
         whole = f"{len(self.rows)} recordings"
-        if all(row.grade is None for row in self.current):
+        if all(row.estimate.grade is None for row in self.current):
             whole = f"no grade is given, {whole}"
         return f"{whole}; now: {verdicts}" if past else f"{whole}: {verdicts}"
 
@@ -434,7 +441,16 @@ def judge_all(
     for number, (item, time) in enumerate(zip(items, times, strict=True)):
         estimate, film = _judged(item, model, baselines, plate)
         advice = _advice(estimate, model)
-        rows.append(_row(number, item, time, estimate, advice))
+        rows.append(
+            BatchRow(
+                number=number,
+                name=item.name,
+                machine=item.machine,
+                time_h=time,
+                estimate=estimate,
+                advice=advice,
+            )
+        )
         if on_result is not None:
             line = _line(item, time, estimate, advice)
             on_result(line | {"film": film_table(film, plate, item.row)})
@@ -470,10 +486,7 @@ def _judged(
         recording = item.load()
         baseline = None if baselines is None else baselines.of(recording)
         film = film_estimate(recording, model.card.severity, plate, baseline)
-        context = recording_context(plate, recording, model.card, baseline)
-        judged = corrected_recording(recording, plate, baseline)
-        estimate = model.estimate(judged, baseline, **context)
-        return with_film(estimate, film), film
+        return with_film(informed_estimate(recording, model, baseline, plate), film), film
     except ModelError:
         raise  # applies to every recording
     except (ValueError, OSError) as error:
@@ -481,43 +494,20 @@ def _judged(
         return Estimate(verdict="unusable", reasons=reasons, mode=model.mode), None
 
 
-def fault_of(item: Item, error: Exception) -> str:
-    """Why a recording could not be read."""
-    return str(error).replace(f"{item.path}: ", "", 1)  # the row has its name
-
-
-def _row(
-    number: int, item: Item, time: float | None, estimate: Estimate, advice: Advice
-) -> BatchRow:
-    notes = (*estimate.reasons, *estimate.cautions)
-    present = [
-        regime_words(f.name) if is_regime(f.name) else f"{f.name.replace('_', ' ')} present"
-        for f in estimate.confounders
-        if f.present
-    ]
-    return BatchRow(
-        number=number,
-        name=item.name,
-        machine=item.machine,
-        time_h=time,
-        headline=headline(estimate).split(":")[0] if estimate.grade is None else _grade(estimate),
-        verdict=estimate.verdict,
-        grade=estimate.grade,
-        severity=estimate.severity,
-        low=estimate.low,
-        high=estimate.high,
-        possible_grades=estimate.possible_grades,
-        action=advice.action,
-        advice=advice.sentence,
-        horizon=advice.horizon,
-        days=advice.days,
-        note="; ".join([*present, *notes[:1]]),
+def informed_estimate(
+    recording: Recording, model: WearModel, baseline: Baseline | None, plate: Nameplate | None
+) -> Estimate:
+    """Estimate of a model for a recording, with all that is known of the machine."""
+    return model.estimate(
+        corrected_recording(recording, plate, baseline),
+        baseline,
+        **recording_context(plate, recording, model.card, baseline),
     )
 
 
-def _grade(estimate: Estimate) -> str:
-    sign = "?" if estimate.verdict == "caution" else ""
-    return f"{estimate.grade} {estimate.grade_name}{sign}"
+def fault_of(item: Item, error: Exception) -> str:
+    """Why a recording could not be read."""
+    return str(error).replace(f"{item.path}: ", "", 1)  # the row has its name
 
 
 def _line(item: Item, time: float | None, estimate: Estimate, advice: Advice) -> dict[str, Any]:
@@ -552,9 +542,8 @@ def _trends(
     """Trend of every machine that has a graded recording with a time."""
     usable: dict[str, list[tuple[float, ...]]] = {}
     for row in rows:
-        point = (row.time_h, row.severity, row.low, row.high)
-        known = tuple(value for value in point if value is not None)
-        if len(known) == len(point):
+        known = tuple(value for value in row.point if value is not None)
+        if len(known) == len(row.point):
             usable.setdefault(row.machine, []).append(known)
     return {
         machine: fit_trend(
@@ -582,24 +571,10 @@ def _with_past(rows: Sequence[BatchRow]) -> list[BatchRow]:
 
 def _hastened(row: BatchRow, trend: Trend | None, model: WearModel) -> BatchRow:
     """Add the trend to the advice on a machine's latest recording; return other rows unchanged."""
-    usable = row.current and row.time_h is not None and row.grade is not None
+    usable = row.current and row.time_h is not None and row.estimate.grade is not None
     if not usable or trend is None or trend.outlook is None:
         return row
-    found = Estimate(
-        verdict="caution" if row.verdict == "caution" else "graded",
-        grade=row.grade,
-        possible_grades=row.possible_grades,
-        low=row.low,
-        high=row.high,
-    )
-    advice = _advice(found, model, trend.outlook)
-    return replace(
-        row,
-        action=advice.action,
-        advice=advice.sentence,
-        horizon=advice.horizon,
-        days=advice.days,
-    )
+    return replace(row, advice=_advice(row.estimate, model, trend.outlook))
 
 
 def _advice(estimate: Estimate, model: WearModel, outlook: Outlook | None = None) -> Advice:

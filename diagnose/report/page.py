@@ -9,7 +9,6 @@ from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import feature_words
 from ..healthy_reference.healthy import Baseline, Baselines
 from ..learning.grades import GRADE_COLOURS, NO_GRADE_COLOUR
-from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate
 from ..nameplate.sensors import corrected_recording
 from ..pages.embed import require_bokeh
@@ -21,7 +20,7 @@ from ..pictures.zoom_curves import zoom_curves
 from ..wear_model.estimate import WearModel
 from ..wear_model.verdict import Estimate
 from .advice import brief_words
-from .batch import Batch, BatchRow, machine_heading
+from .batch import Batch, BatchRow, informed_estimate, machine_heading
 from .figures import (
     ReportPicture,
     gauge,
@@ -150,7 +149,7 @@ def batch_html(
         trend_picture(batch.trends[name], batch.limits, machine_heading(name)) for name in shown
     ]
     details = _details(batch, model, machine, baselines, plate)
-    grades = [row.grade for row in batch.current if row.grade is not None]
+    grades = [row.estimate.grade for row in batch.current if row.estimate.grade is not None]
     outlooks = [trend.outlook for trend in batch.trends.values() if trend.outlook]
     return _rendered(
         "report_batch.html.j2",
@@ -209,9 +208,9 @@ def _bar(row: BatchRow, limit: float) -> str:
     """Interval and estimate on a line, as HTML elements: a picture per row would be too large."""
     low, value, high = (
         100 * min(max((length or 0.0) / (_FULL_SCALE * limit), 0.0), 1.0)
-        for length in (row.low, row.severity, row.high)
+        for length in (row.estimate.low, row.estimate.severity, row.estimate.high)
     )
-    said = f"{100 * (row.severity or 0.0) / limit:.0f} % of the limit"
+    said = f"{100 * (row.estimate.severity or 0.0) / limit:.0f} % of the limit"
     return (
         f'<span class="bar" role="img" aria-label="{said}" title="{said}">'
         f'<i style="left:{low:.1f}%;width:{high - low:.1f}%"></i><u></u>'
@@ -228,13 +227,11 @@ def _details(
 ) -> list[dict[str, Any]]:
     """Tables and pictures of the most urgent graded recordings, read again."""
     found = []
-    for row in [row for row in batch.current if row.grade is not None][:_MOST_DETAILS]:
+    for row in [row for row in batch.current if row.estimate.grade is not None][:_MOST_DETAILS]:
         try:
             recording = batch.items[row.number].load()
             baseline = None if baselines is None else baselines.of(recording)
-            context = recording_context(plate, recording, model.card, baseline)
-            judged = corrected_recording(recording, plate, baseline)
-            estimate = model.estimate(judged, baseline, **context)
+            estimate = informed_estimate(recording, model, baseline, plate)
         except DataError:
             continue  # removed in the meantime
         outlook = batch.outlook_of(row)
@@ -247,6 +244,7 @@ def _details(
             plate=plate,
             outlook=outlook,
         )
+        judged = corrected_recording(recording, plate, baseline)
         pictures = _few_pictures(table, judged, model, estimate, baseline)
         found.append({"table": table, "pictures": pictures})
     return found

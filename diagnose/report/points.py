@@ -69,13 +69,11 @@ def _band(trend: Trend, ahead: tuple[float, ...]) -> tuple[tuple[float, ...], ..
 
 def _is_drawn(row: BatchRow) -> bool:
     """Whether a row has a time, an estimate and its interval, as the trend requires."""
-    return None not in (row.time_h, row.severity, row.low, row.high)
+    return None not in row.point
 
 
 def _mark(row: BatchRow, factor: float, trend: Trend) -> Mark:
-    hours, value, low, high = (
-        float(number or 0.0) for number in (row.time_h, row.severity, row.low, row.high)
-    )
+    hours, value, low, high = (float(number or 0.0) for number in row.point)
     when = f"{hours:.6g} h" if trend.clock == "operating" else _date(hours)
     lines = [
         f"recording: {row.name}",

@@ -95,7 +95,7 @@ def batch_text(batch: Batch) -> str:
     word = severity_word(batch.limits["severity"])
     lines.append(f"{'recording':{width}}  {'verdict':26}  {word + ' [mm]':22}  advice")
     lines += [_row_line(row, width) for row in batch.current]
-    if any(row.verdict == "caution" for row in batch.current):
+    if any(row.estimate.verdict == "caution" for row in batch.current):
         lines.append("?: graded with caution; report that recording alone to see why")
     past = [row for row in batch.rows if not row.current]
     if past:
@@ -118,10 +118,10 @@ def _assumptions(batch: Batch) -> str:
 
 
 def _row_line(row: BatchRow, width: int) -> str:
-    severity = "-"
-    if row.severity is not None and row.low is not None and row.high is not None:
-        severity = f"{1e3 * row.severity:.3f} ({1e3 * row.low:.3f} to {1e3 * row.high:.3f})"
-    note = row.note if row.grade is None else brief_words(row.action, row.horizon)
+    found, advice, severity = row.estimate, row.advice, "-"
+    if found.severity is not None and found.low is not None and found.high is not None:
+        severity = f"{1e3 * found.severity:.3f} ({1e3 * found.low:.3f} to {1e3 * found.high:.3f})"
+    note = row.note if found.grade is None else brief_words(advice.action, advice.horizon)
     return f"{row.name:{width}}  {row.headline:26}  {severity:22}  {_short(note)}"
 
 

@@ -13,10 +13,9 @@ from ...datasets.file.writer import refuse_output
 from ...datasets.measured.recording import read_recording
 from ...sim.output.recording import DataError, Recording, Table
 from ..healthy_reference.healthy import Baseline, Baselines
-from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate, nameplate_of
-from ..nameplate.sensors import corrected_recording
 from ..pages.page import save_page
+from ..report.batch import informed_estimate
 from ..report.figures import draw_gauge
 from ..report.page import report_html
 from ..report.second_estimate import ModelOpinion
@@ -255,7 +254,7 @@ def judged(
 ) -> Report:
     """Report on a recording with known machine data, all of it already read."""
     baseline = baselines.of(recording) if baselines else None
-    estimate = _estimated(recording, model, baseline, plate)
+    estimate = informed_estimate(recording, model, baseline, plate)
     table = report_table(
         recording,
         model,
@@ -279,17 +278,6 @@ def judged(
     )
 
 
-def _estimated(
-    recording: Recording, model: WearModel, baseline: Baseline | None, plate: Nameplate | None
-) -> Estimate:
-    """Estimate of a model for a recording, with all that is known of the machine."""
-    return model.estimate(
-        corrected_recording(recording, plate, baseline),
-        baseline,
-        **recording_context(plate, recording, model.card, baseline),
-    )
-
-
 def _other_opinion(
     recording: Recording,
     model: WearModel,
@@ -310,7 +298,7 @@ def _other_opinion(
             "name one that was trained on other assumptions"
         )
     healthy = Baselines(baselines.source, other.card).of(recording) if baselines else None
-    estimate = _estimated(recording, other, healthy, plate)
+    estimate = informed_estimate(recording, other, healthy, plate)
     return ModelOpinion(
         trained_on=trained.recipe or trained.scene or "another training set",
         severity=estimate.severity,
