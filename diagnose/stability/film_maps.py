@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, cast
 
@@ -24,8 +25,19 @@ from ...sim.output.status import Status
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene, SceneError
 from ...sim.scene.shaft import ShaftScene
-from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, even_ratios
-from .own_point import GAP_LEFT, changed, outcome, own_film, plain_film
+from .method_map import (
+    Cell,
+    Curve,
+    Judge,
+    MapAxis,
+    MapPlan,
+    Own,
+    Verdict,
+    even_ratios,
+    ratio_axis,
+    within,
+)
+from .own_point import GAP_LEFT, changed, outcome, own_film, plain_film, status_words
 
 
 def _film_method(scene: Scene) -> str:
@@ -35,12 +47,7 @@ def _film_method(scene: Scene) -> str:
 
 def _meshed(geometry: FilmGeometry, n_theta: int, n_z: int | None = None) -> FilmGeometry:
     """The same film on another mesh; by default a quarter as many nodes over the length."""
-    return FilmGeometry(
-        length_to_diameter=geometry.length_to_diameter,
-        n_theta=n_theta,
-        n_z=n_z or max(5, n_theta // 4 | 1),
-        condition=geometry.condition,
-    )
+    return replace(geometry, n_theta=n_theta, n_z=n_z or max(5, n_theta // 4 | 1))
 
 
 _FINE = (432, 65)  # nodes of the reference film
@@ -135,7 +142,7 @@ def _film_cell(found: FilmSolution, reference: FilmSolution, accuracy: float) ->
         verdict = _FILM_VERDICT.get(found.status, Verdict.NOT_CONVERGED)
         return verdict, f"{found.status.name.lower()}: {found.status.value}"
     off = float(np.hypot(*(found.force - reference.force)) / np.hypot(*reference.force))
-    return (Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE), f"force off by {off:.2g}"
+    return within(off, accuracy, "force")
 
 
 def relaxation_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
@@ -217,19 +224,12 @@ def length_load(scene: Scene, size: int | None = None) -> MapPlan | str:
 
     @cache
     def reference(ratio: float, number: float) -> Any:
-        fine = FilmGeometry(
-            length_to_diameter=ratio, n_theta=216, n_z=33, condition=geometry.condition
-        )
+        fine = replace(geometry, length_to_diameter=ratio, n_theta=216, n_z=33)
         return equilibrium(fine, _per_sommerfeld(number), raise_on_failure=False)
 
     def judge_of(rung: str) -> Judge:
         def judge(ratio: float, number: float) -> Cell:
-            mesh = FilmGeometry(
-                length_to_diameter=ratio,
-                n_theta=geometry.n_theta,
-                n_z=geometry.n_z,
-                condition=geometry.condition,
-            )
+            mesh = replace(geometry, length_to_diameter=ratio)
             found = equilibrium(mesh, _per_sommerfeld(number), rung=rung, raise_on_failure=False)
             return _rest_cell(found, reference(ratio, number), scene.accuracy)
 
@@ -238,14 +238,10 @@ def length_load(scene: Scene, size: int | None = None) -> MapPlan | str:
     return MapPlan(
         name="length-load",
         title=f"rungs of the film on {geometry.n_theta} x {geometry.n_z} nodes, load by length",
-        x=MapAxis(name="L/D", unit="", values=even_ratios(0.1, 6.0, n)).through(
-            geometry.length_to_diameter
+        x=ratio_axis("L/D", "", 0.1, 6.0, n, own=geometry.length_to_diameter),
+        y=ratio_axis(
+            "Sommerfeld number (light load: large)", "", 0.003, 10.0, n, own=own.sommerfeld
         ),
-        y=MapAxis(
-            name="Sommerfeld number (light load: large)",
-            unit="",
-            values=even_ratios(0.003, 10.0, n),
-        ).through(own.sommerfeld),
         judges={rung: judge_of(rung) for rung in ("short", "finite", "long", "direct")},
         note=f"minimum film within {scene.accuracy:.2g} of a direct solve on 216 x 33 nodes",
         own=Own(
@@ -265,17 +261,15 @@ def _per_sommerfeld(number: float) -> tuple[float, float]:
 
 def _rest_cell(found: Any, reference: Any, accuracy: float) -> Cell:
     status = found.status
-    word = f"{status.name.lower()}: {status.text}"
+    word = status_words(status)
     if status is BearingStatus.COARSE:
         return Verdict.REFUSED, word
     if not reference.status.ok:
-        return Verdict.FAILS, f"{reference.status.name.lower()}: {reference.status.text}"
+        return Verdict.FAILS, status_words(reference.status)
     if not status.ok:
         return Verdict.NOT_CONVERGED, word
     off = abs((1 - found.eccentricity_ratio) / (1 - reference.eccentricity_ratio) - 1)
-    return (
-        Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE
-    ), f"minimum film off by {off:.2g}"
+    return within(off, accuracy, "minimum film")
 
 
 # --- shaft line
@@ -305,25 +299,17 @@ def speed_viscosity(scene: Scene, size: int | None = None) -> MapPlan | str:
         The plan, or why there is none.
     """
     shaft = cast(ShaftScene, scene)
-    n, viscosity = size or 11, shaft.oil.dynamic_viscosity
+    n, speed, viscosity = size or 11, shaft.drive.speed, shaft.oil.dynamic_viscosity
     meshes = dict.fromkeys([(shaft.film.n_theta, shaft.film.n_z), (24, 7)])
     return MapPlan(
         name="speed-viscosity",
         title=f"the line on its films, '{shaft.film.rung}', viscosity by speed",
-        x=MapAxis(
-            name="speed",
-            unit="Hz",
-            values=even_ratios(shaft.drive.speed / 30, 10 * shaft.drive.speed, n),
-        ).through(shaft.drive.speed),
-        y=MapAxis(
-            name="viscosity", unit="Pa s", values=even_ratios(viscosity / 30, viscosity * 10, n)
-        ).through(viscosity),
+        x=ratio_axis("speed", "Hz", speed / 30, 10 * speed, n, own=speed),
+        y=ratio_axis("viscosity", "Pa s", viscosity / 30, viscosity * 10, n, own=viscosity),
         judges={_mesh_name(*mesh): _line_judge(shaft, *mesh) for mesh in meshes},
         note="status, and minimum film against a mesh of twice the nodes in both directions; a "
         "failure is physical if it persists with twice the nodes around the bore",
-        own=Own(
-            method=_mesh_name(shaft.film.n_theta, shaft.film.n_z), x=shaft.drive.speed, y=viscosity
-        ),
+        own=Own(method=_mesh_name(shaft.film.n_theta, shaft.film.n_z), x=speed, y=viscosity),
     )
 
 
@@ -348,7 +334,7 @@ def _line_judge(scene: ShaftScene, n_theta: int, n_z: int) -> Judge:
             found = outcome(_line_at(scene, speed, viscosity, (n_theta, n_z)))
         except SceneError as error:
             return Verdict.REFUSED, error.faults[0]
-        word = f"{found.status.name.lower()}: {found.status.text}"
+        word = status_words(found.status)
         if found.status in _LINE_METHOD:
             return _LINE_METHOD[found.status], word
         # a failed search has already refined its meshes along the length: refine around the bore
@@ -361,7 +347,6 @@ def _line_judge(scene: ShaftScene, n_theta: int, n_z: int) -> Judge:
         if not finer.status.ok:
             return Verdict.INACCURATE, f"a finer mesh ends with {finer.status.name.lower()}"
         off = abs(float(found.numerics["min_film_m"]) / float(finer.numerics["min_film_m"]) - 1)
-        fine = off <= scene.accuracy
-        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"minimum film off by {off:.2g}"
+        return within(off, scene.accuracy, "minimum film")
 
     return judge

@@ -29,8 +29,19 @@ from ...sim.pump_setup.ideal_motion import joint_loads
 from ...sim.pump_setup.joints import joint_parts, joint_rungs
 from ...sim.scene.pump import PumpScene
 from ...sim.scene.scene import Scene, SceneError
-from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios
-from .own_point import changed, outcome
+from .method_map import (
+    Cell,
+    Curve,
+    Judge,
+    MapAxis,
+    MapPlan,
+    Own,
+    Verdict,
+    coordinates,
+    ratio_axis,
+    within,
+)
+from .own_point import changed, outcome, status_words
 from .steppers import STEPPERS, Stepper, bounce, decays
 
 Array = NDArray[np.float64]
@@ -136,12 +147,9 @@ def step_stiffness(scene: Scene, size: int | None = None) -> MapPlan | str:
     rate = math.sqrt(contact.stiffness / contact.mass)
     step = 1 / (pump.sample_rate * steps_per_sample(pump))
     guard = LARGEST_STEP_PER_CONTACT_TIME / contact_rate(pump) / step
-    x = MapAxis(name="step", unit="s", values=even_ratios(0.02 / rate, 20 / rate, n)).through(step)
-    y = MapAxis(
-        name="contact stiffness",
-        unit="N/m",
-        values=even_ratios(contact.stiffness / 100, contact.stiffness * 100, n),
-    ).through(contact.stiffness)
+    k = contact.stiffness
+    x = ratio_axis("step", "s", 0.02 / rate, 20 / rate, n, own=step)
+    y = ratio_axis("contact stiffness", "N/m", k / 100, k * 100, n, own=k)
     judges = {s.name: _stepper_judge(s, contact, x, y, scene.accuracy) for s in STEPPERS}
     curves = {s.name: _stepper_curve(s, contact, y) for s in STEPPERS}
     judges[_MECHANISM] = _mechanism_judge(pump, contact)
@@ -257,8 +265,7 @@ def _mechanism_judge(scene: PumpScene, contact: _Contact) -> Judge:
         off, mean = abs(found.mean() / right.mean() - 1), right.mean()
         # impacts are chaotic: the scatter between starts is no error
         scatter = 3 * math.hypot(found.std(ddof=1), right.std(ddof=1)) / math.sqrt(len(_STARTS))
-        fine = off <= max(scene.accuracy, scatter / mean)
-        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"rms force off by {off:.2g}"
+        return within(off, max(scene.accuracy, scatter / mean), "rms force")
 
     return judge
 
@@ -302,25 +309,19 @@ def clearance_speed(scene: Scene, size: int | None = None) -> MapPlan | str:
     pump = cast(PumpScene, scene)
     if pump.joint.crankpin.rung != "compliant":
         return "the crank pin is not compliant; set joint.crankpin.rung = 'compliant'"
-    n, gap = size or 9, pump.joint.crankpin.clearance_diametral
+    n, speed, gap = size or 9, pump.drive.speed, pump.joint.crankpin.clearance_diametral
     if gap == 0:
         return "the crank pin has no clearance; set joint.crankpin.diametral_clearance"
     method = f"step of the scene, and a {_FINER}th"
     return MapPlan(
         name="clearance-speed",
         title="crank-pin clearance by speed, the scene otherwise as written",
-        x=MapAxis(
-            name="speed",
-            unit="Hz",
-            values=even_ratios(pump.drive.speed / 4, 4 * pump.drive.speed, n),
-        ).through(pump.drive.speed),
-        y=MapAxis(
-            name="diametral clearance", unit="m", values=even_ratios(gap / 30, gap * 10, n)
-        ).through(gap),
+        x=ratio_axis("speed", "Hz", speed / 4, 4 * speed, n, own=speed),
+        y=ratio_axis("diametral clearance", "m", gap / 30, gap * 10, n, own=gap),
         judges={method: lambda x, y: _pump_cell(pump, x, y)},
         note=f"status and contact, repeated at a {_FINER}th of the step; chaos: increasing the "
         "clearance by 1e-9 separates the orbits by a thousandth of it",
-        own=Own(method=method, x=pump.drive.speed, y=gap),
+        own=Own(method=method, x=speed, y=gap),
     )
 
 
@@ -338,7 +339,7 @@ def _pump_cell(scene: PumpScene, speed: float, clearance: float) -> Cell:
     except SceneError as error:
         return Verdict.REFUSED, error.faults[0]
     if not first.numerics:  # refused before the run
-        return Verdict.REFUSED, f"{first.status.name.lower()}: {first.status.text}"
+        return Verdict.REFUSED, status_words(first.status)
     finer = changed(pump, {"numerics.step": float(first.numerics["step_s"]) / _FINER})
     again = outcome(finer)
     if not first.status.ok:
@@ -350,16 +351,12 @@ def _pump_cell(scene: PumpScene, speed: float, clearance: float) -> Cell:
     lost = _flight(first, clearance)
     if lost > 0 and _flight(again, clearance) > 0:
         return Verdict.LOST, f"in flight for {lost:.1%} of the time"
-    off = abs(_pin_rms(first) / _pin_rms(again) - 1)
-    return (
-        Verdict.ACCURATE if off <= scene.accuracy else Verdict.INACCURATE
-    ), f"rms force off by {off:.2g}"
+    return within(abs(_pin_rms(first) / _pin_rms(again) - 1), scene.accuracy, "rms force")
 
 
 def _failed_cell(status: Status | OrbitStatus, finer: Status | OrbitStatus) -> Cell:
     """Verdict on a failed run; a failure that a finer run shows too has a physical cause."""
-    word = status.name.lower()
-    return (Verdict.UNSTABLE if finer.ok else Verdict.FAILS), f"{word}: {status.text}"
+    return (Verdict.UNSTABLE if finer.ok else Verdict.FAILS), status_words(status)
 
 
 def _is_chaotic(scene: PumpScene, run: Recording, clearance: float) -> bool:

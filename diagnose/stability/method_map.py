@@ -138,6 +138,13 @@ def even_ratios(low: float, high: float, size: int) -> tuple[float, ...]:
     return tuple(float(value) for value in np.geomspace(low, high, size))
 
 
+def ratio_axis(
+    name: str, unit: str, low: float, high: float, size: int, *, own: float | None
+) -> MapAxis:
+    """Logarithmic axis with the scene's own value on it."""
+    return MapAxis(name=name, unit=unit, values=even_ratios(low, high, size)).through(own)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Curve:
     """A limit drawn over a map.
@@ -166,6 +173,13 @@ _PREFIXED = {"s", "m", "N", "N/m", "Pa s"}
 
 Cell = tuple[Verdict, str]
 """Verdict and its explanation: a status, an error."""
+
+
+def within(error: float, accuracy: float, what: str) -> Cell:
+    """Verdict on the relative error of a quantity; NaN is inaccurate."""
+    fine = error <= accuracy
+    return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"{what} off by {error:.2g}"
+
 
 Judge = Callable[[float, float], Cell]
 """``(x, y) -> cell``: one run of one method."""

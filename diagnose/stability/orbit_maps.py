@@ -18,8 +18,8 @@ from ...sim.journal.recording import film_geometry, journal_film, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene
-from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios
-from .own_point import GAP_LEFT, changed, journal_weight, orbit_step, own_film
+from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, ratio_axis
+from .own_point import GAP_LEFT, changed, journal_weight, orbit_step, own_film, status_words
 from .steppers import STEPPERS, Stepper
 
 Array = NDArray[np.float64]
@@ -45,8 +45,8 @@ def step_squeeze(scene: Scene, size: int | None = None) -> MapPlan | str:
     journal = cast(JournalScene, scene)
     case = _orbit_case(journal)
     n, step, gap = size or 13, orbit_step(journal), own_film(journal).gap
-    x = MapAxis(name="step", unit="rad", values=even_ratios(1e-5, 1.0, n)).through(step)
-    y = MapAxis(name=GAP_LEFT, unit="", values=even_ratios(0.01, 0.95, n)).through(gap)
+    x = ratio_axis("step", "rad", 1e-5, 1.0, n, own=step)
+    y = ratio_axis(GAP_LEFT, "", 0.01, 0.95, n, own=gap)
     by_name = {stepper.name: stepper for stepper in STEPPERS}
     euler, runge = by_name["semi-implicit euler"], by_name["runge-kutta 4"]
     limits = {
@@ -250,7 +250,7 @@ def _orbit_cell(
     status: OrbitStatus = OrbitStatus.OK,
 ) -> Cell:
     if not reference.status.ok:
-        return Verdict.FAILS, f"{reference.status.name.lower()}: {reference.status.text}"
+        return Verdict.FAILS, status_words(reference.status)
     if not status.ok or len(path) < len(reference.position):
         return Verdict.UNSTABLE, status.name.lower() if not status.ok else "leaves the bore"
     away = np.hypot(*(path[: len(reference.position)] - reference.position).T).max()
@@ -280,17 +280,11 @@ def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
         Or why there is none.
     """
     journal = cast(JournalScene, scene)
-    n, weight = size or 11, journal_weight(journal)
+    n, speed, weight = size or 11, journal.drive.speed, journal_weight(journal)
     if not weight > 0:
         return "the journal carries no load; set load.static, in newtons"
-    x = MapAxis(
-        name="speed",
-        unit="Hz",
-        values=even_ratios(journal.drive.speed / 4, 8 * journal.drive.speed, n),
-    ).through(journal.drive.speed)
-    y = MapAxis(name="load", unit="N", values=even_ratios(weight / 30, weight * 10, n)).through(
-        weight
-    )
+    x = ratio_axis("speed", "Hz", speed / 4, 8 * speed, n, own=speed)
+    y = ratio_axis("load", "N", weight / 30, weight * 10, n, own=weight)
     numerics = journal.numerics
     own = f"{numerics.integrator}, as written"
     settings: dict[str, tuple[str, float, float]] = {
@@ -306,7 +300,7 @@ def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
         curves={"": [threshold_curve(journal, x, y)]},
         note="a displacement of a hundredth of the gap decays or grows; the reference is the "
         "adaptive integrator at a hundredth of its tolerance",
-        own=Own(method=own, x=journal.drive.speed, y=weight),
+        own=Own(method=own, x=speed, y=weight),
     )
 
 
@@ -444,7 +438,7 @@ def whirls(
     try:
         rest = equilibrium(film_geometry(here), (weight / unit, 0.0), rung=rung)
     except BearingError as error:
-        return None, f"{error.status.name.lower()}: {error.status.text}"
+        return None, status_words(error.status)
     place = rest.position * (1 - 0.01 * (1 / rest.eccentricity_ratio - 1))
     run = run_orbit(
         film,
@@ -459,7 +453,7 @@ def whirls(
     if run.status in (OrbitStatus.THIN, OrbitStatus.CONTACT):  # from near its equilibrium
         return True, f"grows to the wall: {run.status.text}"
     if not run.status.ok:
-        return None, f"{run.status.name.lower()}: {run.status.text}"
+        return None, status_words(run.status)
     turn = round(4 * math.pi / 0.2)  # samples per revolution at half the speed
     early = float(np.ptp(run.position[turn : 3 * turn], axis=0).max())
     late = float(np.ptp(run.position[-2 * turn :], axis=0).max())

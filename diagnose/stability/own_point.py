@@ -8,12 +8,15 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
+from ...sim.bearing.bearing_status import BearingStatus
 from ...sim.bearing.equilibrium import equilibrium, sommerfeld_number
 from ...sim.film.solve import FilmGeometry
+from ...sim.journal.orbit_status import OrbitStatus
 from ...sim.journal.recording import film_geometry, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.machine.simulate import simulate
 from ...sim.output.recording import Recording
+from ...sim.output.status import Status
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
@@ -141,6 +144,11 @@ def changed(part: Any, values: Mapping[str, Any]) -> Any:
         inner = changed(getattr(part, head), {rest: value}) if rest else value
         part = part.model_copy(update={head: inner})
     return part
+
+
+def status_words(status: Status | OrbitStatus | BearingStatus) -> str:
+    """Name and text of a status."""
+    return f"{status.name.lower()}: {status.text}"
 
 
 def outcome(scene: Scene) -> Recording:

@@ -18,7 +18,7 @@ from ...sim.scene.pump import PumpScene
 from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid
 from ...sim.scene.pump_joints import PumpJoints
 from ...sim.scene.scene import Scene
-from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, even_ratios
+from .method_map import Cell, Curve, Judge, MapPlan, Own, Verdict, ratio_axis, within
 from .own_point import changed
 
 Array = NDArray[np.float64]
@@ -50,15 +50,12 @@ def step_line(scene: Scene, size: int | None = None) -> MapPlan | str:
     n, speed = size or 13, line.wave_speed
     step = 1 / (pump.sample_rate * steps_per_sample(pump))
     guard = line.length / (FEWEST_REACHES * speed)
-    x = MapAxis(name="step", unit="s", values=even_ratios(guard / 10, guard * 10, n)).through(step)
-    y = MapAxis(
-        name="length of the discharge line",
-        unit="m",
-        values=even_ratios(line.length / 10, line.length * 10, n),
-    ).through(line.length)
+    length = line.length
+    x = ratio_axis("step", "s", guard / 10, guard * 10, n, own=step)
+    y = ratio_axis("length of the discharge line", "m", length / 10, length * 10, n, own=length)
     crossed = Curve(
         name=f"guard: {FEWEST_REACHES} steps of travel",
-        x=tuple(length / (FEWEST_REACHES * speed) for length in y.values),
+        x=tuple(each / (FEWEST_REACHES * speed) for each in y.values),
         y=y.values,
     )
     return MapPlan(
@@ -87,9 +84,7 @@ def _line_pulsation(line: Line, rung: str, accuracy: float) -> Judge:
         if step * exact * _LEAST_PER_PERIOD > 1:
             return Verdict.INACCURATE, "fewer than three steps per period: a rigid column"
         found = _ringing(smooth, step, math.ceil(_RUNG_PERIODS / (exact * step)), rung)
-        off = abs(found / exact - 1)
-        fine = off <= accuracy  # False for NaN, if the oscillation has ended
-        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
+        return within(abs(found / exact - 1), accuracy, "frequency")  # NaN if it has ended
 
     return judge
 
@@ -141,12 +136,8 @@ def step_casing(scene: Scene, size: int | None = None) -> MapPlan | str:
     mode = max(each.frequency for each in pump.casing.modes)
     n, rate = size or 13, math.tau * mode
     step = 1 / (pump.sample_rate * steps_per_sample(pump))
-    x = MapAxis(name="step", unit="s", values=even_ratios(0.05 / rate, 20 / rate, n)).through(step)
-    y = MapAxis(
-        name="casing at bearing over moving mass",
-        unit="",
-        values=even_ratios(own / 30, own * 30, n),
-    ).through(own)
+    x = ratio_axis("step", "s", 0.05 / rate, 20 / rate, n, own=step)
+    y = ratio_axis("casing at bearing over moving mass", "", own / 30, own * 30, n, own=own)
     return MapPlan(
         name="step-casing",
         title=f"free vibration of a {mode:.4g} Hz casing with its mechanism, step by masses",
@@ -178,9 +169,8 @@ def _casing_judge(scene: PumpScene, mode: float) -> Judge:
         first, last = np.ptp(force[:quarter]), np.ptp(force[-quarter:])
         if not last < _GROWN * first:  # also for NaN
             return Verdict.UNSTABLE, "grows"
-        off = abs(_frequency(force - force.mean(), step) / exact - 1)
-        fine = off <= scene.accuracy  # False for NaN, with too few periods
-        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
+        off = abs(_frequency(force - force.mean(), step) / exact - 1)  # NaN with too few periods
+        return within(off, scene.accuracy, "frequency")
 
     return judge
 
