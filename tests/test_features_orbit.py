@@ -271,7 +271,7 @@ def test_every_orbit_feature_is_one_function_with_a_reference():
     every = (*standard_rows.CATALOGUE, *orbit_rows.ORBIT_CATALOGUE)
     assert len({feature.name for feature in every}) == len(every)
     for feature in orbit_rows.ORBIT_CATALOGUE:
-        assert np.size(feature.function(analysis)) == len(feature.labels(shared.STANDARD, FS))
+        assert np.size(feature.function(analysis)) == len(feature.labels_for(shared.STANDARD, FS))
         assert feature.reference
         assert feature.unit
 

@@ -57,7 +57,7 @@ def test_every_feature_is_one_function_with_a_reference():
     analysis = shared.Analysis(vibration, FS, pulses=order.pulse_times(tacho, FS))
     per_scope = {"channel": 2, "pair": 1, "shaft": 1}
     for feature in standard_rows.CATALOGUE:
-        labels = feature.labels(shared.STANDARD, FS)
+        labels = feature.labels_for(shared.STANDARD, FS)
         assert np.size(feature.function(analysis)) == per_scope[feature.scope] * len(labels)
         assert feature.reference
         assert feature.unit

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..response import response_change, transfer
 from ..signal.spectrum import decibel
 from .analysis import Analysis, Settings
-from .feature import EWINS, ROLLING_BEARING, Feature, fault_labels, named, scores, stacked
+from .feature import EWINS, ROLLING_BEARING, Feature, fault_labels, scores, stacked
 
 Float = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         unit="Hz, Hz, -, -",
         needs=("frames",),
         uses=("tacho",),
-        labels=named(
+        labels=(
             "kurtogram.centre_hz",
             "kurtogram.bandwidth_hz",
             "kurtogram.kurtosis",
@@ -138,7 +138,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         unit="dB re 1 N/(x in m)",
         needs=("force",),
         scope="path",
-        labels=named("static.stiffness_db", "static.residual_stiffness_db"),
+        labels=("static.stiffness_db", "static.residual_stiffness_db"),
         function=_static_stiffness,
         reference=f"transfer.static_flexibility; {EWINS}",
     ),
@@ -147,7 +147,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         unit="-",
         needs=("force", "reference", "reference modes"),
         scope="frf",
-        labels=named("resonance_shift.mean", "resonance_shift.found"),
+        labels=("resonance_shift.mean", "resonance_shift.found"),
         function=_resonance_shift,
         reference="response_change.resonance_shift",
     ),

@@ -38,8 +38,9 @@ class Feature:
     scope : {"channel", "housing", "path", "pair", "shaft", "orbit", "frf", "cylinder"}
         Whether it exists once per channel, per acceleration, per path from a force to another
         channel, per pair of channels, per record, per orbit, per test, or per cylinder pressure.
-    labels : callable
-        ``labels(settings, fs)`` names the values within one of these.
+    labels : tuple of str, or callable
+        Names of the values within one of these, or ``labels(settings, fs)`` that gives them; by
+        default one value, with the name of the feature.
     function : callable
         ``function(analysis)`` computes the values [shape=(n_channels, …), (n_paths, …), (n_pairs,
         …) or (…)].
@@ -58,14 +59,15 @@ class Feature:
     needs: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
     scope: Scope = "channel"
-    labels: Callable[[Settings, float], tuple[str, ...]]
+    labels: tuple[str, ...] | Callable[[Settings, float], tuple[str, ...]] = ()
     function: Callable[[Analysis], NDArray[Any]]
     reference: str
 
-
-def named(*labels: str) -> Callable[[Settings, float], tuple[str, ...]]:
-    """Labels that do not depend on the settings."""
-    return lambda _settings, _fs: labels
+    def labels_for(self, settings: Settings, fs: float) -> tuple[str, ...]:
+        """Labels at some settings and a sample rate [Hz]."""
+        if callable(self.labels):
+            return self.labels(settings, fs)
+        return self.labels or (self.name,)
 
 
 def band_names(edges: Float) -> tuple[str, ...]:
@@ -92,6 +94,6 @@ def scores(lines: list[list[FaultLine | None]]) -> Float:
     return np.array([[line.score if line is not None else 0.0 for line in row] for row in lines])
 
 
-def fault_labels(prefix: str, part: str) -> Callable[[Settings, float], tuple[str, ...]]:
+def fault_labels(prefix: str, part: str) -> tuple[str, ...]:
     """Labels of one part for every fault of rolling bearings."""
-    return named(*(f"{prefix}_{fault}.{part}" for fault in FAULTS))
+    return tuple(f"{prefix}_{fault}.{part}" for fault in FAULTS)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..rotation import orbit
 from ..signal.spectrum import decibel
 from .analysis import Analysis, Settings
-from .feature import Feature, named
+from .feature import Feature
 
 Float = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ ORBIT_CATALOGUE: tuple[Feature, ...] = (
         unit="x, rad, -",
         needs=("probes",),
         scope="orbit",
-        labels=named(
+        labels=(
             "centreline.x",
             "centreline.y",
             "centreline.radius_db",
@@ -80,7 +80,7 @@ ORBIT_CATALOGUE: tuple[Feature, ...] = (
         unit="dB re 1 x^2",
         needs=("probes",),
         scope="orbit",
-        labels=named("largest_excursion_db"),
+        labels=("largest_excursion_db",),
         function=lambda a: decibel(orbit.largest_excursion(a.path) ** 2),
         reference="orbit.largest_excursion; ISO 20816-1:2016",
     ),
@@ -107,7 +107,7 @@ ORBIT_CATALOGUE: tuple[Feature, ...] = (
         unit="-",
         needs=("tacho", "probes"),
         scope="orbit",
-        labels=named("mark_cos", "mark_sin"),
+        labels=("mark_cos", "mark_sin"),
         function=_mark,
         reference="orbit.orbit_path",
     ),
@@ -116,7 +116,7 @@ ORBIT_CATALOGUE: tuple[Feature, ...] = (
         unit="-, dB re 1 x^2",
         needs=("tacho", "probes"),
         scope="orbit",
-        labels=named("whirl_ratio", "whirl_db"),
+        labels=("whirl_ratio", "whirl_db"),
         function=_whirl,
         reference="orbit.whirl; Grandke, IEEE Trans. Instrum. Meas. 32 (1983) 350-355",
     ),

@@ -234,7 +234,7 @@ def _check_channels(channels: tuple[str, ...]) -> None:
 
 def _names_of(row: Feature, layout: Layout) -> tuple[str, ...]:
     """Names of all values of a feature."""
-    labels = row.labels(layout.settings, layout.fs)
+    labels = row.labels_for(layout.settings, layout.fs)
     return tuple(f"{owner}.{label}" for owner in _owners(row.scope, layout) for label in labels)
 
 

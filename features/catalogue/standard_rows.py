@@ -11,7 +11,7 @@ from ..response import operational
 from ..rotation import order
 from ..signal.spectrum import decibel
 from .analysis import Analysis, Settings
-from .feature import RANDOM_DATA, WELCH, Feature, band_names, named, order_labels
+from .feature import RANDOM_DATA, WELCH, Feature, band_names, order_labels
 
 Float = NDArray[np.float64]
 
@@ -66,10 +66,10 @@ EDGE_SCATTER_SAMPLES = 1 / math.sqrt(6)
 """Scatter of intervals between edges known to one sample [samples]: the limit for a sampled logic
 level, applied to averaged edges, too, so that a model does not see more in them."""
 
-_DEAD_CENTRES = named(
-    *(f"dead_centre_{a}.{place}_db" for a in ("000", "180") for place in ("around", "after"))
+_DEAD_CENTRES = tuple(
+    f"dead_centre_{a}.{place}_db" for a in ("000", "180") for place in ("around", "after")
 )
-_HARMONICS = named(*(f"angle_harmonic_{k}.{part}_db" for k in (1, 2, 3) for part in ("cos", "sin")))
+_HARMONICS = tuple(f"angle_harmonic_{k}.{part}_db" for k in (1, 2, 3) for part in ("cos", "sin"))
 
 _MOMENTS = "Dyer, Stewart, J. Mech. Design 100 (1978) 229-235"
 
@@ -83,56 +83,48 @@ CATALOGUE: tuple[Feature, ...] = (
     Feature(
         name="rms",
         unit="x",
-        labels=named("rms"),
         function=lambda a: a.amplitude.rms,
         reference="statistics.rms",
     ),
     Feature(
         name="peak",
         unit="x",
-        labels=named("peak"),
         function=lambda a: a.amplitude.peak,
         reference="statistics.peak",
     ),
     Feature(
         name="peak_to_peak",
         unit="x",
-        labels=named("peak_to_peak"),
         function=lambda a: a.amplitude.peak_to_peak,
         reference="statistics.peak_to_peak",
     ),
     Feature(
         name="crest_factor",
         unit="-",
-        labels=named("crest_factor"),
         function=lambda a: a.amplitude.crest_factor,
         reference="statistics.crest_factor",
     ),
     Feature(
         name="kurtosis",
         unit="-",
-        labels=named("kurtosis"),
         function=lambda a: a.amplitude.kurtosis,
         reference=f"statistics.kurtosis; {_MOMENTS}",
     ),
     Feature(
         name="skewness",
         unit="-",
-        labels=named("skewness"),
         function=lambda a: a.amplitude.skewness,
         reference=f"statistics.skewness; {_MOMENTS}",
     ),
     Feature(
         name="shape_factor",
         unit="-",
-        labels=named("shape_factor"),
         function=lambda a: a.amplitude.shape_factor,
         reference="statistics.shape_factor",
     ),
     Feature(
         name="impulse_factor",
         unit="-",
-        labels=named("impulse_factor"),
         function=lambda a: a.amplitude.impulse_factor,
         reference="statistics.impulse_factor",
     ),
@@ -180,7 +172,6 @@ CATALOGUE: tuple[Feature, ...] = (
         name="angle_kurtosis",
         unit="-",
         needs=("tacho", "casing"),
-        labels=named("angle_kurtosis"),
         function=lambda a: order.angle_kurtosis(a.profile),
         reference="order.angle_kurtosis",
     ),
@@ -188,7 +179,6 @@ CATALOGUE: tuple[Feature, ...] = (
         name="impacts_per_revolution",
         unit="1/rev",
         needs=("tacho", "casing"),
-        labels=named("impacts_per_revolution"),
         function=_impacts,
         reference="order.impacts_per_revolution",
     ),
@@ -196,7 +186,7 @@ CATALOGUE: tuple[Feature, ...] = (
         name="rms_ratio",
         unit="dB",
         scope="pair",
-        labels=named("rms_ratio_db"),
+        labels=("rms_ratio_db",),
         function=_rms_ratios,
         reference="statistics.rms",
     ),
@@ -205,7 +195,7 @@ CATALOGUE: tuple[Feature, ...] = (
         unit="Hz",
         needs=("tacho",),
         scope="shaft",
-        labels=named("speed_hz"),
+        labels=("speed_hz",),
         function=_speed,
         reference="order.pulse_times",
     ),
@@ -214,7 +204,6 @@ CATALOGUE: tuple[Feature, ...] = (
         unit="-",
         needs=("tacho",),
         scope="shaft",
-        labels=named("speed_variation"),
         function=_speed_variation,
         reference="order.pulse_times",
     ),
@@ -235,7 +224,7 @@ CYLINDER_CATALOGUE: tuple[Feature, ...] = (
         unit="x",
         needs=("tacho", "mark", "cylinder"),
         scope="cylinder",
-        labels=named("suction", "discharge"),
+        labels=("suction", "discharge"),
         function=_of_cylinders("suction", "discharge"),
         reference="pressure.transitions",
     ),
@@ -244,7 +233,7 @@ CYLINDER_CATALOGUE: tuple[Feature, ...] = (
         unit="x",
         needs=("tacho", "mark", "cylinder"),
         scope="cylinder",
-        labels=named("suction_ripple", "discharge_ripple"),
+        labels=("suction_ripple", "discharge_ripple"),
         function=_of_cylinders("suction_ripple", "discharge_ripple"),
         reference="pressure.transitions",
     ),
@@ -253,7 +242,7 @@ CYLINDER_CATALOGUE: tuple[Feature, ...] = (
         unit="deg",
         needs=("tacho", "mark", "cylinder"),
         scope="cylinder",
-        labels=named("rise_deg", "rise_width_deg", "fall_deg", "fall_width_deg"),
+        labels=("rise_deg", "rise_width_deg", "fall_deg", "fall_width_deg"),
         function=_of_cylinders("rise", "rise_width", "fall", "fall_width"),
         reference=f"pressure.transitions; {_PUMP}",
     ),
