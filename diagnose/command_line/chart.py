@@ -32,7 +32,6 @@ from ..options.shared import (
     scene_of,
     seed_option,
     set_option,
-    worker_count,
 )
 
 
@@ -150,7 +149,7 @@ def chart(
     choice: str,
     interactive: bool,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -181,7 +180,7 @@ def chart(
             output=output,
             applied=applied,
             seed=seed,
-            jobs=worker_count(jobs),
+            jobs=jobs,
             force=force,
             interactive=interactive,
         )
@@ -213,7 +212,7 @@ def chart(
         output=output,
         applied=applied,
         choice=choice,
-        jobs=worker_count(jobs),
+        jobs=jobs,
         force=force,
         interactive=interactive,
     )
@@ -234,7 +233,7 @@ def _data_chart(
     budget: float | None,
     output: Path | None,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     force: bool,
     interactive: bool,
 ) -> Any:
@@ -243,9 +242,7 @@ def _data_chart(
 
     check_outputs([subject], [(output, CHART_SUFFIXES)], force)
     with progress_bar("measuring") as progress:
-        found = model_chart(
-            subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
-        )
+        found = model_chart(subject, seed=seed, budget=budget, jobs=jobs, progress=progress)
     if output is not None:
         save_chart(found, output, force=force, interactive=interactive)
     return found

@@ -24,7 +24,6 @@ from ..options.shared import (
     json_option,
     records_option,
     seed_option,
-    worker_count,
 )
 
 
@@ -69,7 +68,7 @@ def generate(
     twin: Path | None,
     fidelity: Literal["given", "auto"] | None,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     scheduler: str | None,
     force: bool,
     as_json: bool,
@@ -93,7 +92,7 @@ def generate(
             output,
             view=view,
             seed=seed,
-            jobs=worker_count(jobs),
+            jobs=jobs,
             scheduler=scheduler,
             force=force,
             truth=truth,
@@ -318,7 +317,7 @@ def audit(
     train: Sequence[Path],
     test: Sequence[Path],
     fail_on: str | None,
-    jobs: int | None,
+    jobs: int,
     as_json: bool,
 ) -> None:
     """Find leaks, copies and unfit splits in data sets (.h5) and tables (.csv, .parquet).
@@ -336,9 +335,7 @@ def audit(
         raise click.UsageError("give FILES, or --train and --test")
     roles = Roles(label=label, group=group, split=split, nuisance=tuple(nuisance))
     with progress_bar("reading records") as progress:
-        found = run(
-            paths, roles, train=train, test=test, jobs=worker_count(jobs), progress=progress
-        )
+        found = run(paths, roles, train=train, test=test, jobs=jobs, progress=progress)
     emit(audit_table(found), as_json, audit_text(found))
     code = {"warning": EXIT_WARNING, "alarm": EXIT_ALARM}.get(found.verdict, 0) if fail_on else 0
     raise click.exceptions.Exit(0 if fail_on == "alarm" and code == EXIT_WARNING else code)

@@ -22,7 +22,6 @@ from ..options.shared import (
     overrides_of,
     seed_option,
     set_option,
-    worker_count,
 )
 
 
@@ -89,7 +88,7 @@ def evaluate(
     output: Path | None,
     seed: int,
     force: bool,
-    jobs: int | None,
+    jobs: int,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -126,9 +125,9 @@ def evaluate(
     if kind_of(model_file) == CLASS_MODEL:
         if named or output:
             raise click.UsageError("this option does not apply to a model of named conditions")
-        _judge_classes(model_file, data, seed, worker_count(jobs), as_json)
+        _judge_classes(model_file, data, seed, jobs, as_json)
         return
-    _judge(model_file, data, output, seed, worker_count(jobs), force, as_json, given)
+    _judge(model_file, data, output, seed, jobs, force, as_json, given)
 
 
 _EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
@@ -193,7 +192,7 @@ def _judge_across(
     pairs: Sequence[str],
     folder: Path | None,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     as_json: bool,
 ) -> None:
     """Losses from training on cheaper rungs; the data sets are deleted unless a folder is given."""
@@ -209,7 +208,7 @@ def _judge_across(
             effects=effects,
             overrides=overrides_of(pairs),
             seed=seed,
-            jobs=worker_count(jobs),
+            jobs=jobs,
             say=lambda text: click.echo(text, err=True),
         )
     emit(across_table(found), as_json, across_text(found))

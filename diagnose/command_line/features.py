@@ -24,7 +24,6 @@ from ..options.shared import (
     jobs_option,
     join_option,
     json_option,
-    worker_count,
 )
 from ..options.source import (
     Numbers,
@@ -100,7 +99,7 @@ def features(
     rank: bool,
     target: str | None,
     joined: Sequence[str],
-    jobs: int | None,
+    jobs: int,
     force: bool,
     as_json: bool,
     **about: Any,
@@ -143,7 +142,7 @@ def features(
     elif slow := [name for name, why in absent.items() if why.startswith("fs = ")]:
         click.echo(f"absent: {', '.join(slow)}: {absent[slow[0]]}", err=True)
     with progress_bar("features") as progress:
-        table = feature_table(data, choice=choice, jobs=worker_count(jobs), progress=progress)
+        table = feature_table(data, choice=choice, jobs=jobs, progress=progress)
     if rank:
         _emit_rank(data, table, choice, target, output, force, as_json)
         return

@@ -20,7 +20,6 @@ from ..options.shared import (
     force_option,
     jobs_option,
     json_option,
-    worker_count,
 )
 from ..options.source import (
     bearing_option,
@@ -105,7 +104,7 @@ def import_files(
     output: Path | None,
     only_list: bool,
     limits: str | None,
-    jobs: int | None,
+    jobs: int,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -137,7 +136,7 @@ def import_files(
             limits=read_limits(limits, labels.severities) if limits else None,
             places=texts_by_channel(given["place"], "--place"),
             directions=texts_by_channel(given["direction"], "--direction"),
-            jobs=worker_count(jobs),
+            jobs=jobs,
             progress=progress,
             **{name: given[name] for name in _IMPORT_OPTIONS},
         )

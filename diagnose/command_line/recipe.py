@@ -15,7 +15,6 @@ from ..options.shared import (
     json_option,
     records_option,
     seed_option,
-    worker_count,
 )
 
 
@@ -100,7 +99,7 @@ def recipe_preview(
     records: int | None,
     plot: Path | None,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -109,7 +108,7 @@ def recipe_preview(
     from ..inspect.recipe_preview import preview, preview_figure, preview_text
 
     check_outputs([name], [(plot, PICTURE_SUFFIXES)], force)
-    found = preview(load_recipe(name), records, seed=seed, cores=worker_count(jobs))
+    found = preview(load_recipe(name), records, seed=seed, cores=jobs)
     if plot is not None:
         from ..pages.picture import save_picture
 

@@ -26,7 +26,6 @@ from ..options.shared import (
     report_bare_units,
     seed_option,
     set_option,
-    worker_count,
 )
 
 _SUFFIXES = (*CHART_SUFFIXES, ".htm")
@@ -92,7 +91,7 @@ def sweep(
     output: Path | None,
     interactive: bool,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -130,7 +129,7 @@ def sweep(
     interrupted = False
     try:
         with progress_bar("simulating") as progress:
-            measure(plan, kept, jobs=worker_count(jobs), progress=progress)
+            measure(plan, kept, jobs=jobs, progress=progress)
     except KeyboardInterrupt:
         interrupted = True
     found = sweep_of(plan, kept)

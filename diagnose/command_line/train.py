@@ -21,7 +21,6 @@ from ..options.shared import (
     join_option,
     json_option,
     seed_option,
-    worker_count,
 )
 
 
@@ -62,7 +61,7 @@ def calibrate(
     recipe: str | None,
     budget: float | None,
     seed: int,
-    jobs: int | None,
+    jobs: int,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -83,7 +82,7 @@ def calibrate(
             unknown=unknown,
             budget_s=budget,
             seed=seed,
-            jobs=worker_count(jobs),
+            jobs=jobs,
             progress=progress,
         )
     found.save(output, force=force)
@@ -153,7 +152,7 @@ def train(
     budget_ms: float | None,
     joined: Sequence[str],
     seed: int,
-    jobs: int | None,
+    jobs: int,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -190,7 +189,7 @@ def train(
                 f"--baseline, --budget-ms, --held-out, --join, --refuse and --split are for a "
                 f"severity; {target} names conditions, and every recording is left out in turn"
             )
-        _train_classes(data, output, target, choices[0], seed, worker_count(jobs), force, as_json)
+        _train_classes(data, output, target, choices[0], seed, jobs, force, as_json)
         return
     with progress_bar("features") as progress:
         model, table, test = train_model(
@@ -199,7 +198,7 @@ def train(
             held_out=held_out,
             split=split,
             seed=seed,
-            jobs=worker_count(jobs),
+            jobs=jobs,
             budget_ms=budget_ms,
             baseline=healthy,
             refuse=refuse,
@@ -213,7 +212,7 @@ def train(
                 data,
                 healthy,
                 choice=choice_in(model.card.feature_choice),
-                jobs=worker_count(jobs),
+                jobs=jobs,
                 progress=progress,
             )
     save_model(model, output, force=force)
@@ -283,7 +282,7 @@ def _train_classes(
 @seed_option
 @jobs_option
 @json_option
-def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
+def demo(folder: Path, seed: int, jobs: int, as_json: bool) -> None:
     """Run the whole workflow on a small example: simulate, features, train, evaluate, report."""
     from ..evaluation.text import score_lines
     from ..workflow.demo import run_demo
@@ -292,7 +291,7 @@ def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
         result = run_demo(
             folder,
             seed=seed,
-            jobs=worker_count(jobs),
+            jobs=jobs,
             progress=progress,
             say=lambda text: click.echo(text, err=True),
         )

@@ -78,11 +78,19 @@ set_option = click.option(
 
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
+
+def _workers(_context: click.Context, _option: click.Parameter, given: int | None) -> int:
+    from ...datasets.workers.local import cores
+
+    return given or cores()
+
+
 jobs_option = click.option(
     "-j",
     "--jobs",
     type=click.IntRange(1),
     default=None,
+    callback=_workers,
     help="Worker processes; all cores by default. The result does not depend on it.",
 )
 
@@ -110,13 +118,6 @@ join_option = click.option(
 def emit(value: dict[str, Any], as_json: bool, text: str) -> None:
     """Print a result, as JSON or as text."""
     click.echo(json_text({"schema_version": 1, **value}) if as_json else text)
-
-
-def worker_count(jobs: int | None) -> int:
-    """Number of worker processes requested, or else of cores."""
-    from ...datasets.workers.local import cores
-
-    return jobs or cores()
 
 
 def scene_of(name: str, pairs: Sequence[str]) -> Any:
