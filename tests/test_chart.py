@@ -1,6 +1,7 @@
 """Speed against accuracy: the front, who wins and who may not, the files, and real scenes."""
 
 import csv
+import functools
 import itertools
 import json
 import math
@@ -947,39 +948,50 @@ def few_rungs(name, folder, *pinned):
     return str(path)
 
 
-BRIEF = {**SMALL, "duration": 0.05, "numerics.tolerance": 1e-4}
+AT_LEISURE = ("--budget", "1e6", "-o")  # on a busy machine too it is not the clock that ends it
+
+BRIEF = {
+    "journal-bearing": ({**SMALL, "duration": 0.05, "numerics.tolerance": 1e-4}, ["tolerance"]),
+    # of 3 s, cut to four revolutions; a chart of its step
+    "bilge-pump": (
+        {"duration": 3, "sample_rate": 5120, "settling_revolutions": 1}, [*OTHERS, "pressure"],
+    ),
+}  # fmt: skip
+"""Scene -> sizes, and effects as they stand, of a chart that is made in seconds."""
 
 
-@pytest.mark.parametrize(
-    ("name", "sizes", "dear", "pinned"),
-    [
-        ("journal-bearing", BRIEF, 1.0, ["tolerance"]),
-        # of 3 s, cut to four revolutions; a chart of its step
-        ("bilge-pump", {"duration": 3, "sample_rate": 5120, "settling_revolutions": 1}, 0.01,
-         [*OTHERS, "pressure"]),
-    ],
-)  # fmt: skip
-def test_an_interrupted_chart_goes_on_to_the_same_page(
-    name, sizes, dear, pinned, tmp_path, monkeypatch
-):
+@pytest.fixture(scope="module")
+def whole_chart(tmp_path_factory):
+    """Scene file, chart as a table and number of its runs, by the name of the scene."""
+
+    @functools.cache
+    def made(name):
+        folder, calls = tmp_path_factory.mktemp(name), itertools.count()
+        plain, (sizes, pinned) = Pilot._run, BRIEF[name]
+
+        def counted(self, values, start):
+            next(calls)
+            return plain(self, values, start)
+
+        subject, page = few_rungs(name, folder, *pinned), folder / "pages" / "whole.csv"
+        page.parent.mkdir()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("wearstate.sim.fidelity.study._EXPENSIVE", 0.01)
+            patch.setattr(Pilot, "_run", counted)
+            done = run_chart(subject, sizes, *AT_LEISURE, str(page))
+        assert done.exit_code == 0, done.output
+        assert list(page.parent.iterdir()) == [page]  # nothing is left beside it
+        return subject, page, next(calls)
+
+    return made
+
+
+@pytest.mark.parametrize("name", BRIEF)
+def test_an_interrupted_chart_goes_on_to_the_same_page(name, whole_chart, tmp_path, monkeypatch):
     """Ctrl-C in the middle: an answer, exit code 1, and the same command ends as if nothing was."""
-    monkeypatch.setattr("wearstate.sim.fidelity.study._EXPENSIVE", dear)
-    (tmp_path / "pages").mkdir()
-    whole, page = (tmp_path / "pages" / f"{kind}.csv" for kind in ("whole", "page"))
-    subject = few_rungs(name, tmp_path, *pinned)
-    made = Pilot._run
-    calls = itertools.count()
-
-    def counted(self, values, start):
-        next(calls)
-        return made(self, values, start)
-
-    monkeypatch.setattr(Pilot, "_run", counted)
-    at_leisure = ("--budget", "1e6", "-o")  # on a busy machine too it is not the clock that ends it
-    done = run_chart(subject, sizes, *at_leisure, str(whole))
-    assert done.exit_code == 0, done.output
-    assert list(whole.parent.iterdir()) == [whole]  # nothing is left beside it
-    needed = next(calls)
+    monkeypatch.setattr("wearstate.sim.fidelity.study._EXPENSIVE", 0.01)
+    (subject, whole, needed), sizes = whole_chart(name), BRIEF[name][0]
+    page, made = tmp_path / "page.csv", Pilot._run
     assert needed >= 10
     half, calls = needed // 2, itertools.count()
 
@@ -989,12 +1001,12 @@ def test_an_interrupted_chart_goes_on_to_the_same_page(
         return made(self, values, start)
 
     monkeypatch.setattr(Pilot, "_run", stopped)
-    done = run_chart(subject, sizes, *at_leisure, str(page))
+    done = run_chart(subject, sizes, *AT_LEISURE, str(page))
     assert done.exit_code == 1
     assert "the same command continues from there" in done.stderr
     assert "Your scene as written is" in done.stdout
     assert page.with_suffix(".part.json").exists()
-    again = run_chart(subject, sizes, *at_leisure, str(page))
+    again = run_chart(subject, sizes, *AT_LEISURE, str(page))
     assert again.exit_code == 0, again.output
     assert not page.with_suffix(".part.json").exists()
     assert next(calls) == needed + 1  # one was broken off, none is made twice
@@ -1007,13 +1019,11 @@ def without_seconds(path):
     return [{k: v for k, v in row.items() if k not in ("seconds", "on_front")} for row in rows]
 
 
-def test_errors_do_not_depend_on_the_number_of_workers(tmp_path):
-    pages = [tmp_path / f"{jobs}.csv" for jobs in (1, 2)]
-    subject = few_rungs("journal-bearing", tmp_path, "tolerance")
-    for jobs, path in zip((1, 2), pages, strict=True):
-        done = run_chart(subject, BRIEF, "-j", str(jobs), "--budget", "1e6", "-o", str(path))
-        assert done.exit_code == 0, done.output
-    assert without_seconds(pages[0]) == without_seconds(pages[1])
+def test_errors_do_not_depend_on_the_number_of_workers(whole_chart, tmp_path):
+    (subject, alone, _), page = whole_chart("journal-bearing"), tmp_path / "2.csv"
+    done = run_chart(subject, BRIEF["journal-bearing"][0], "-j", "2", *AT_LEISURE, str(page))
+    assert done.exit_code == 0, done.output
+    assert without_seconds(page) == without_seconds(alone)
 
 
 def test_a_chart_without_points_has_no_legend():
