@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.charts import across as module
 from wearstate.diagnose.charts.across import (
-    across_fidelity,
+    RungSets,
     across_table,
     across_text,
     sign_flip_test,
@@ -171,7 +171,7 @@ def test_a_rung_that_cannot_be_made_is_told():
 
 def test_unknown_effects_are_refused(tmp_path):
     with pytest.raises(DataError, match=r"effect = 'flim' is none .* did you mean 'film'"):
-        across_fidelity("journal-bearing-small", 24, tmp_path, effects=["flim"])
+        RungSets("journal-bearing-small", 24, tmp_path, effects=["flim"])
 
 
 @pytest.mark.parametrize(

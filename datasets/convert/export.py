@@ -6,6 +6,7 @@ import shlex
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...sim.atomic import replacing
 from ...sim.output.recording import DataError, Recording
-from ..file.attributes import stamped
+from ..file.attributes import Attributes, stamped
 from ..file.csv_cells import safe_frame
 from ..file.hdf5_values import write_values
 from ..file.machines import FILE
@@ -181,28 +182,28 @@ class _Format:
     signals_optional: bool = False
 
 
+@dataclass(frozen=True, kw_only=True)
 class _Job:
     """One export and its progress."""
 
-    def __init__(
-        self,
-        *,
-        data: DataSet,
-        way: _Format,
-        target: Path,
-        signals: bool,
-        compress: bool,
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
-        self.data = data
-        self.head = data.attributes
-        self.way = way
-        self.target = target
-        self.signals = signals
-        self.compress = compress
-        self.progress = progress
-        ok = data.rows["status"] == b"ok"
-        self.indices: list[int] = np.flatnonzero(ok | (not way.folder)).tolist()
+    data: DataSet
+    way: _Format
+    target: Path
+    signals: bool
+    compress: bool
+    progress: Callable[[int, int], None] | None
+
+    @property
+    def head(self) -> Attributes:
+        """Attributes of the data set."""
+        return self.data.attributes
+
+    @cached_property
+    def indices(self) -> list[int]:
+        """Records to write: a folder's files cannot mark those that failed."""
+        ok = self.data.rows["status"] == b"ok"
+        found: list[int] = np.flatnonzero(ok | (not self.way.folder)).tolist()
+        return found
 
     def records(self) -> Iterator[tuple[int, Recording]]:
         """Every record to write, with its checksum verified."""

@@ -89,38 +89,12 @@ class Across:
     draws: int
 
 
-def across_fidelity(
-    name: str | Path,
-    n: int,
-    folder: Path,
-    *,
-    effects: Sequence[str] = (),
-    overrides: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    jobs: int = 1,
-    say: Callable[[str], None] | None = None,
-) -> Across:
-    """Generate a recipe on every rung of its effects, train on each and judge on the best.
+def across_fidelity(sets: "RungSets") -> Across:
+    """Train on the data set of each rung of each effect, and judge on the best rungs.
 
     Parameters
     ----------
-    name : str or Path
-        Recipe.
-    n : int
-        Records per rung.
-    folder : Path
-        Folder of the data sets, one per rung; existing ones are reused.
-    effects : sequence of str
-        Effects to be raised and lowered, while others stay as written; by default all but steps
-        and meshes.
-    overrides : mapping, optional
-        Dotted path of the scene -> value.
-    seed : int
-        Seed of the data sets and the folds.
-    jobs : int
-        Worker processes.
-    say : callable, optional
-        Called with a line for every rung.
+    sets : RungSets
 
     Returns
     -------
@@ -129,13 +103,8 @@ def across_fidelity(
     Raises
     ------
     DataError
-        An effect is unknown or has only one rung, or there are too few machine draws.
-    RecipeError
-        The recipe is invalid.
+        There are too few machine draws.
     """
-    sets = RungSets(
-        name, n, folder, effects=effects, overrides=overrides, seed=seed, jobs=jobs, say=say
-    )
     judge = sets.judge()
     losses = [
         loss_of(sets, judge, effect.name, rung.name, {**sets.best, effect.name: rung.name})
@@ -157,8 +126,23 @@ class RungSets:
 
     Parameters
     ----------
-    name, n, folder, effects, overrides, seed, jobs, say
-        As in :func:`across_fidelity`.
+    name : str or Path
+        Recipe.
+    n : int
+        Records per rung.
+    folder : Path
+        Folder of the data sets, one per rung; existing ones are reused.
+    effects : sequence of str
+        Effects to be raised and lowered, while others stay as written; by default all but steps
+        and meshes.
+    overrides : mapping, optional
+        Dotted path of the scene -> value.
+    seed : int
+        Seed of the data sets and the folds.
+    jobs : int
+        Worker processes.
+    say : callable, optional
+        Called with a line for every rung.
 
     Attributes
     ----------
@@ -168,6 +152,13 @@ class RungSets:
         Effects whose rungs are compared.
     best, written : dict of str to str
         Effect -> its best rung, and the rung in the recipe's scene.
+
+    Raises
+    ------
+    DataError
+        An effect is unknown or has only one rung.
+    RecipeError
+        The recipe is invalid.
     """
 
     def __init__(

@@ -198,10 +198,10 @@ def _judge_across(
     """Losses from training on cheaper rungs; the data sets are deleted unless a folder is given."""
     from tempfile import TemporaryDirectory
 
-    from ..charts.across import across_fidelity, across_table, across_text
+    from ..charts.across import RungSets, across_fidelity, across_table, across_text
 
     with TemporaryDirectory() as passing:
-        found = across_fidelity(
+        sets = RungSets(
             str(recipe),
             records,
             folder or Path(passing),
@@ -211,6 +211,7 @@ def _judge_across(
             jobs=jobs,
             say=lambda text: click.echo(text, err=True),
         )
+        found = across_fidelity(sets)
     emit(across_table(found), as_json, across_text(found))
 
 
