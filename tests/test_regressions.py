@@ -278,6 +278,15 @@ def test_a_net_for_a_wear_that_is_the_same_in_all_records_predicts_it():
     assert part.predict(rows) == pytest.approx(target, rel=0.05)
 
 
+def test_nets_learn_two_kinds_that_any_feature_separates():
+    """Rounding leaves the importance of some features of such kinds just below zero."""
+    kind = np.repeat([1.0, 2.0], [400, 50])
+    rows = np.random.default_rng(0).standard_normal((450, 300))
+    rows[:, :100] += 8 * (kind[:, None] > 1)
+    part = ROWS["nets"].fit(rows, rows, kind, 0, 0)
+    np.testing.assert_allclose(part.predict(rows), kind, rtol=0.2)
+
+
 def test_few_records_train_no_net(task):
     rows, target, groups = (each[: FEWEST_RECORDS - 1] for each in task)
     fitted = fit_blend(rows, target, group_folds(groups, n=3, seed=0))

@@ -139,7 +139,8 @@ def _importances(deviation: Float, level: Float, seed: int) -> Float:
     forest = ExtraTreesRegressor(
         _TREES, min_samples_leaf=_LEAF, max_features=_TRIED, random_state=seed
     ).fit(deviation[records], level[records])
-    return np.asarray(forest.feature_importances_)
+    # a sum over all splits, which rounding may leave just below zero
+    return np.maximum(forest.feature_importances_, 0.0)
 
 
 def _directions(deviation: Float, importance: Float, noted: int) -> Float:
