@@ -146,7 +146,7 @@ def test_a_bearing_without_any_speed_says_where_one_can_come_from(tmp_path):
 def test_a_speed_that_only_some_records_have_is_refused(tmp_path):
     data = data_set(tmp_path / "d.h5", 20_480.0, [{"speed_hz": 25.0}, {"speed_hz": np.nan}])
     options = ("--set", "core", "--bearing", "8,20,120")
-    done = run("features", data, "-o", tmp_path / "t.csv", *options, code=2)
+    done = run("features", data, "-o", tmp_path / "t.csv", *options, "-j", 1, code=2)
     assert "features are not in every record" in done.stderr
     assert "give --speed-hz for all" in done.stderr
     assert not (tmp_path / "t.csv").exists()

@@ -523,10 +523,10 @@ def test_severity_is_stratified_from_the_start(standard):
 
 
 def test_no_two_recipes_share_a_machine():
-    names = [name for name in recipe_names() if not load_recipe(name).table.machines_of]
-    first = [next(sample_records(load_recipe(name))).drawn for name in names]
-    assert len(names) > 10
-    assert len({drawn["sensors.0.gain"] for drawn in first}) == len(names)
+    recipes = [load_recipe(name) for name in recipe_names()]
+    first = [next(sample_records(each)).drawn for each in recipes if not each.table.machines_of]
+    assert len(first) > 10
+    assert len({drawn["sensors.0.gain"] for drawn in first}) == len(first)
 
 
 def test_the_shifted_set_lies_outside_the_standard_one():

@@ -4,6 +4,7 @@ import dataclasses
 import re
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages.picture import PHONE_PX
@@ -31,13 +32,18 @@ def test_the_gauge_and_a_trend_are_read_on_a_phone():
     assert trend_picture(trend, limits, "machine 1").image.least <= PHONE_PX
 
 
-def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
-    """Where rows are stacked the head is gone: each value but the name has its own."""
-    page = tmp_path / "page.html"
+@pytest.fixture(scope="module")
+def rig_page(tmp_path_factory):
+    """Page of the alignment of a shaft rig."""
+    page = tmp_path_factory.mktemp("rig") / "page.html"
     done = CliRunner().invoke(cli, ["align", "shaft-rig", "-o", str(page)])
     assert done.exit_code == 0, done.output
-    text = page.read_text()
-    tables = re.findall(r"<table.*?</table>", text, flags=re.DOTALL)
+    return page.read_text()
+
+
+def test_every_value_of_a_table_of_bearings_tells_what_it_is(rig_page):
+    """Where rows are stacked the head is gone: each value but the name has its own."""
+    tables = re.findall(r"<table.*?</table>", rig_page, flags=re.DOTALL)
     assert len(tables) == 8  # three conditions, before and after, margins, jacks, films, influence
     for table in tables:
         assert re.match('<table class="stack( many)?">', table)
@@ -45,8 +51,8 @@ def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
             cells = re.findall(r"<td[^>]*>", row)
             assert len(cells) > 1
             assert all("data-label=" in cell for cell in cells[1:])
-    assert 'data-label="reaction [kN]"' in text
-    assert 'data-label="third up"' in text
+    assert 'data-label="reaction [kN]"' in rig_page
+    assert 'data-label="third up"' in rig_page
 
 
 def test_what_cannot_wait_is_before_what_is_worse():
@@ -68,11 +74,9 @@ def test_what_cannot_wait_is_before_what_is_worse():
     assert sorted(same, key=lambda row: row.urgency)[0].estimate.severity == 6e-4
 
 
-def test_the_films_table_may_wrap_its_pairs(tmp_path):
+def test_the_films_table_may_wrap_its_pairs(rig_page):
     """Unwrapped, nine columns of "as set → after" are wider than the page and are cut off."""
-    page = tmp_path / "page.html"
-    assert CliRunner().invoke(cli, ["align", "shaft-rig", "-o", str(page)]).exit_code == 0
-    text = page.read_text()
+    text = rig_page
     films = text[text.index("Oil films by speed") :]
     assert re.search(r"<table[^>]*>", films)[0] == '<table class="stack many">'
     general, many = (text.index(rule) for rule in ("td { white-space: nowrap", ".many td,"))

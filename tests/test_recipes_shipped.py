@@ -1,5 +1,6 @@
 """The recipes that come with the package: what each must hold, so that figures mean something."""
 
+from functools import cache
 from operator import attrgetter
 
 import numpy as np
@@ -26,6 +27,12 @@ BRIEF = {
     "propulsion-shaft": {"duration": "1 s"},
 }
 """Machine -> overrides for a recording that takes some 50 ms."""
+
+
+@cache
+def shipped(name):
+    """A recipe as it comes; each is asked for by several tests."""
+    return load_recipe(name)
 
 
 def drawn(recipe, n=N, seed=0):
@@ -72,14 +79,14 @@ def test_a_motor_far_from_its_label_is_refused_with_the_cure():
 
 @pytest.fixture(scope="module", params=MACHINES)
 def standard(request):
-    recipe = load_recipe(f"{request.param}-standard")
+    recipe = shipped(f"{request.param}-standard")
     return recipe, drawn(recipe)
 
 
 @pytest.mark.parametrize("machine", [*MACHINES, *TESTS])
 @pytest.mark.parametrize("kind", ["small", "standard", "shifted", "healthy"])
 def test_every_machine_has_its_recipes(machine, kind):
-    recipe = load_recipe(f"{machine}-{kind}")
+    recipe = shipped(f"{machine}-{kind}")
     assert machine.startswith(recipe.scene.name)
     forces = [channel.name for channel in channels_of(recipe.scene) if channel.quantity == "force"]
     assert bool(forces) == (machine in TESTS)
@@ -87,7 +94,7 @@ def test_every_machine_has_its_recipes(machine, kind):
 
 @pytest.mark.parametrize("name", recipe_names())
 def test_the_first_records_of_every_recipe_simulate(name):
-    plain = load_recipe(name)
+    plain = shipped(name)
     brief = BRIEF[plain.scene.machine]
     recipe = load_recipe(name, brief)
     for sample in sample_records(recipe, 2, seed=1):
@@ -102,7 +109,7 @@ def test_the_first_records_of_every_recipe_simulate(name):
     "name", [*(f"{m}-standard" for m in (*MACHINES, *TESTS)), "bilge-pump-faults"]
 )
 def test_sets_that_figures_are_quoted_on_have_a_thousand_machines(name):
-    table = load_recipe(name).table
+    table = shipped(name).table
     assert table.records / table.records_per_group >= 1000
     assert table.sampling == "sobol"
 
@@ -178,7 +185,7 @@ NUISANCE = {
 
 @pytest.mark.parametrize("name", NUISANCE)
 def test_nuisance_fills_the_ranges_of_the_design(name):
-    recipe = load_recipe(name)
+    recipe = shipped(name)
     of_options = drawn_by_options(recipe)
     values = {**drawn(recipe), **of_options}
     for path, (low, high) in NUISANCE[name].items():
@@ -290,7 +297,7 @@ SHIFTED_LOAD = {
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_the_shifted_set_is_beyond_the_standard_one(machine):
-    standard, shifted = (load_recipe(f"{machine}-{kind}") for kind in ("standard", "shifted"))
+    standard, shifted = (shipped(f"{machine}-{kind}") for kind in ("standard", "shifted"))
     there, here = spans(standard), spans(shifted)
     own = standard.scene.drive.speed
     assert_allclose(here["drive.speed"], [(0.7 * own, 1.3 * own)])
@@ -306,7 +313,7 @@ def test_the_shifted_set_is_beyond_the_standard_one(machine):
 
 
 def test_modes_of_the_shifted_sets_move_by_a_fifth():
-    pump, shaft = load_recipe("bilge-pump-shifted"), load_recipe("propulsion-shaft-shifted")
+    pump, shaft = shipped("bilge-pump-shifted"), shipped("propulsion-shaft-shifted")
     for i, mode in enumerate(pump.scene.casing.modes):
         band = spans(pump)[f"casing.modes.{i}.frequency"]
         assert_allclose(band, [(0.8 * mode.frequency, 1.2 * mode.frequency)])
@@ -318,9 +325,9 @@ def test_modes_of_the_shifted_sets_move_by_a_fifth():
 
 
 def test_models_of_the_shifted_sets_are_trained_on_nowhere():
-    others = [load_recipe(name) for name in recipe_names() if not name.endswith("-shifted")]
+    others = [shipped(name) for name in recipe_names() if not name.endswith("-shifted")]
     scenes = [recipe.scene for recipe in others]
-    pump, journal, shaft = (load_recipe(f"{machine}-shifted").scene for machine in MACHINES)
+    pump, journal, shaft = (shipped(f"{machine}-shifted").scene for machine in MACHINES)
     pumps = [scene for scene in scenes if scene.machine == "reciprocating-pump"]
     assert pump.joint.crankpin.law not in {scene.joint.crankpin.law for scene in pumps}
     journals = [scene for scene in scenes if scene.machine == "journal-bearing"]
@@ -362,7 +369,7 @@ def test_the_other_law_and_films_make_another_signal():
 
 @pytest.mark.parametrize("machine", TESTS)
 def test_tests_of_the_shifted_sets_are_beyond_the_standard_ones(machine):
-    standard, shifted = (load_recipe(f"{machine}-{kind}") for kind in ("standard", "shifted"))
+    standard, shifted = (shipped(f"{machine}-{kind}") for kind in ("standard", "shifted"))
     assert shifted.scene.duration == standard.scene.duration / 2  # half the averages
     there, here = spans(standard), spans(shifted)
     assert {path for path in there if there[path] != here[path]} >= {SHIFTED_TEST[machine]}
@@ -380,7 +387,7 @@ SHIFTED_TEST = {
 
 @pytest.mark.parametrize("machine", TESTS)
 def test_healthy_tests_are_of_the_machines_of_the_standard_set(machine):
-    standard, healthy = (load_recipe(f"{machine}-{kind}") for kind in ("standard", "healthy"))
+    standard, healthy = (shipped(f"{machine}-{kind}") for kind in ("standard", "healthy"))
     pairs = zip(*(sample_records(r, 5, seed=5) for r in (standard, healthy)), strict=True)
     for worn, new in pairs:
         assert worn.group == new.group
@@ -394,7 +401,7 @@ def test_healthy_tests_are_of_the_machines_of_the_standard_set(machine):
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_healthy_recordings_are_of_the_machines_of_the_standard_set(machine):
-    standard, healthy = (load_recipe(f"{machine}-{kind}") for kind in ("standard", "healthy"))
+    standard, healthy = (shipped(f"{machine}-{kind}") for kind in ("standard", "healthy"))
     worn = {s.group: s for s in sample_records(standard, 40, seed=5)}
     new = list(sample_records(healthy, 60, seed=5))
     machine_paths = [axis.path for axis in standard.machine]
@@ -448,7 +455,7 @@ def test_machines_of_a_file_beside(tmp_path):
     base.write_text('name = "base"\nextends = "journal-bearing-small"\n')
     text = 'name = "mine"\nextends = "base.toml"\nmachines_of = "base"\nrecords_per_group = 4\n'
     mine = load_text(tmp_path, text)
-    one, other = (next(sample_records(recipe)).drawn for recipe in (mine, load_recipe(base)))
+    one, other = (next(sample_records(recipe)).drawn for recipe in (mine, shipped(base)))
     same = {path for path in one if one[path] == other[path]}
     assert same == {axis.path for axis in mine.machine}
     base.write_text('name = "misnamed"\nextends = "journal-bearing-small"\n')
@@ -464,13 +471,13 @@ def test_an_added_severity_or_confounder_leaves_the_machines(tmp_path):
     )
     mine = load_text(tmp_path, healthy_text(more=fault))
     one = next(sample_records(mine, seed=2))
-    other = next(sample_records(load_recipe("bilge-pump-standard"), seed=2))
+    other = next(sample_records(shipped("bilge-pump-standard"), seed=2))
     assert one.row["confounder_loud"]
     assert all(one.drawn[axis.path] == other.drawn[axis.path] for axis in mine.machine)
 
 
 @pytest.mark.parametrize("name", recipe_names())
 def test_it_comes_back_from_the_texts_of_a_file(name):
-    recipe = load_recipe(name)
+    recipe = shipped(name)
     again = recorded_recipe(recipe.scene_text, recipe.text, overrides_text(recipe))
     assert next(sample_records(again)).drawn == next(sample_records(recipe)).drawn

@@ -176,8 +176,8 @@ def test_recordings_in_a_pipeline_and_a_search():
     assert_allclose(search.predict(recordings(24)), size, rtol=0.05)
 
 
-def test_a_data_set_is_a_list_of_recordings(small_set):
-    with wearstate.DataSet(small_set) as data:
+def test_a_data_set_is_a_list_of_recordings(few_set):
+    with wearstate.DataSet(few_set) as data:
         wear = data.manifest[data.attributes.severities[0]].to_numpy()
         model = make_pipeline(
             SignalFeatures(only=["rms", "band_levels"]), StandardScaler(), Ridge()
