@@ -136,9 +136,15 @@ def chart_from(*candidates, **options):
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def chart():
     return chart_from(SHORT, COARSE, TORN)
+
+
+@pytest.fixture(scope="module")
+def page(chart):
+    """Page of that chart."""
+    return chart_html(chart)
 
 
 # -- the front
@@ -227,14 +233,14 @@ def test_a_rung_of_the_scene_is_charged_in_words_and_hertz():
     assert [line.split(":")[0] for line in told[1:]] == ["We recommend"]
 
 
-def test_what_to_take_comes_as_toml_and_as_options(chart):
+def test_what_to_take_comes_as_toml_and_as_options(chart, page):
     kept, raised = chart.choices
     assert kept.changes == {"film.rung": "map", "film.n_theta": 36, "film.n_z": 9}
     values = tomllib.loads(kept.block)
     assert values == {"film": {"rung": "map", "n_theta": 36, "n_z": 9}}
     assert kept.options == "--set film.rung=map --set film.n_theta=36 --set film.n_z=9"
     assert (raised.keeps, raised.block) == (True, "")
-    for shown in (chart_text(chart), chart_html(chart), json.dumps(chart_table(chart))):
+    for shown in (chart_text(chart), page, json.dumps(chart_table(chart))):
         assert "n_theta = 36" in shown
 
 
@@ -403,9 +409,8 @@ def test_rungs_are_listed_before_the_settings_the_worst_first():
     assert page.index("each simplified model alone") < page.index("Recommended settings")
 
 
-def test_a_card_without_settings_leaves_no_blank_beside_it(chart):
+def test_a_card_without_settings_leaves_no_blank_beside_it(page):
     """Kept has settings, raised has none: each across the page."""
-    page = chart_html(chart)
     cards = re.findall(r'<div class="(choice [^"]*)"><h3>(.*?)</h3>', page)
     assert [("thin" in look) for look, _ in cards] == [True, True]
     assert cards[1][1] == "Rungs may change: nothing to change"
@@ -726,8 +731,7 @@ def test_a_mean_stands_beside_its_bound_and_ranks():
     assert "(2 starts)&rdquo; marks a mean of two runs" in chart_html(chart)
 
 
-def test_times_that_are_estimated_are_called_so_and_the_own_numerics_are_told_once(chart):
-    page = chart_html(chart)
+def test_times_that_are_estimated_are_called_so_and_the_own_numerics_are_told_once(chart, page):
     for question in chart.questions:
         label = question_figure(chart, question).axes[0].get_xlabel()
         assert label == "estimated time per simulated second [s]"
@@ -736,11 +740,10 @@ def test_times_that_are_estimated_are_called_so_and_the_own_numerics_are_told_on
     assert page.count("Your scene: mesh 72 around and 17 along.") == 1
 
 
-def test_the_reference_has_a_name_and_no_number(chart):
+def test_the_reference_has_a_name_and_no_number(chart, page):
     [reference] = [p for p in chart.of(RAISED) if p.verdict == "reference"]
     assert kind_of(reference) == REFERENCE
     assert reference not in chart.numbered(RAISED)
-    page = chart_html(chart)
     [row] = re.findall(rf"<tr[^>]*><td>{reference.name}</td>.*?</tr>", page)
     assert 'data-label="error">&ndash;</td>' in row
     assert 'data-label="number"></td>' in row
@@ -799,9 +802,8 @@ def test_points_of_the_picture_have_names(chart, tmp_path):
     assert "src=" not in page  # nothing is fetched
 
 
-def test_every_value_of_the_page_tells_what_it_is_on_a_phone(chart):
+def test_every_value_of_the_page_tells_what_it_is_on_a_phone(chart, page):
     """Where rows are stacked the head is gone: each value but the name has its own."""
-    page = chart_html(chart)
     tables = re.findall(r"<table.*?</table>", page, flags=re.DOTALL)
     assert len(tables) == 1 + len(chart.questions)
     for table in tables:
