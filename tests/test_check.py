@@ -10,7 +10,13 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.audit.integrity import check_set, checked_table, checked_text
+from wearstate.datasets.audit.integrity import (
+    check_set,
+    checked_table,
+    checked_text,
+    refuse_shared,
+    refuse_wrong_labels,
+)
 from wearstate.datasets.file.attributes import HASHES, Attributes, manifest_hash, signal_checksum
 from wearstate.datasets.file.columns import describe_columns, meanings
 from wearstate.datasets.file.record import DataSet
@@ -20,6 +26,7 @@ from wearstate.datasets.generation.work import NUMERICS
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.workflow.evaluate import evaluate
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
@@ -319,6 +326,58 @@ def test_a_grade_that_the_limits_contradict_is_found(copy):
     check, records, text = the_fault(copy)
     assert (check, records) == ("grade", (0,))
     assert "limits 0.00013, 0.00022, 0.00031 m" in text
+
+
+def test_labels_in_millimetres_are_found(copy):
+    def in_millimetres(rows):
+        rows[CLEARANCE] *= 1e3
+        rows["grade"] = 3
+
+    relabel(copy, in_millimetres)
+    found = [text for check, _, text in faults(copy) if check == "grade"]
+    assert found == [
+        f"{CLEARANCE} is more than 20 times the condemning limit, 0.00031 m; labels are in metres: "
+        "check the unit"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (set_to(CLEARANCE, 2, np.inf), f"record 2: {CLEARANCE} is infinite"),
+        (set_to(CLEARANCE, [1, 2], 0.1), f"records 1, 2: {CLEARANCE} is more than 20 times"),
+        (set_to("grade", slice(None), 3), "grade must be what"),
+        (set_to(CLEARANCE, 4, 1e-6), f"record 4: {CLEARANCE} must be within 5e-05"),
+    ],
+)
+def test_wrong_labels_neither_train_nor_judge_a_model(copy, change, message):
+    refuse_wrong_labels(copy)
+    relabel(copy, change)
+    with pytest.raises(DataError, match=re.escape(message)):
+        refuse_wrong_labels(copy)
+    with pytest.raises(DataError, match=re.escape(message)):
+        evaluate("any.wsm", copy)
+    ran = CliRunner().invoke(cli, ["train", str(copy), "-o", f"{copy}.wsm"])
+    assert ran.exit_code == 2
+    assert message in ran.stderr
+
+
+def test_a_signal_of_two_machines_trains_no_model(copy):
+    with DataSet(copy) as data:
+        twin = data[0].signal
+    resign(copy, 1, twin)  # of the same machine: no leak
+    refuse_wrong_labels(copy)
+    resign(copy, 6, twin)
+    with pytest.raises(DataError, match="records 0, 1, 6: signal is that of another record; also"):
+        refuse_wrong_labels(copy)
+
+
+def test_what_is_to_be_refused_is_not_trained_on(copy, made, journal, monkeypatch):
+    refuse_shared(made, [journal])
+    with pytest.raises(DataError, match=r"records 0, 1, 2, 3, 4 and 3 more: also in the training"):
+        refuse_shared(made, [journal, copy])
+    monkeypatch.setattr("wearstate.datasets.audit.integrity.np.array_equal", lambda *_: False)
+    refuse_shared(made, [copy])  # checksums that are equal by chance
 
 
 def test_a_confounder_and_its_value_belong_together(copy):

@@ -384,6 +384,12 @@ def test_labels_do_not_contradict_file_or_limits(tmp_path):
         files, tmp_path / "x.h5", r"grade = 3 must be 1 by diametral", labels=known,
         limits=read_limits("bilge-pump", known.severities), **plain,
     )  # fmt: skip
+    millimetres = read_labels(None, {CLEARANCE: "0.2"})
+    text = refused(
+        files, tmp_path / "x.h5", r"a\.mat \(and 1 more\): .* = 0\.2 m must be at most 20 times",
+        labels=millimetres, limits=read_limits("bilge-pump", known.severities), **plain,
+    )  # fmt: skip
+    assert "as in 'diametral_clearance_crankpin [mm]'" in text
     manifest = made(files, tmp_path / "x.h5", **plain)[2]
     assert manifest["speed_hz"].tolist() == [25.0, 30.0]
 

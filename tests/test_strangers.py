@@ -179,7 +179,7 @@ def test_what_cannot_be_shown_is_named(few_set, flooded_set, tmp_path):
     slow = tmp_path / "slow.toml"
     slow.write_text(FLOODED + 'sample_rate = "20 kHz"\n')
     generate(slow, 2, other, seed=0, jobs=1)
-    generate("bilge-pump-small", 2, few, seed=0, jobs=1)
+    generate("bilge-pump-small", 2, few, seed=1, jobs=1)
     with pytest.raises(DataError, match=r"sample_rate = 20000\.0 must be 25600\.0, as of"):
         train(few_set, refuse=[few, other])
     with pytest.raises(DataError, match="refuse: 2 recordings of bilge-pump-small, must be >= 20"):
@@ -191,6 +191,16 @@ def test_what_cannot_be_shown_is_named(few_set, flooded_set, tmp_path):
         train(few_set, refuse=[tmp_path / "one.h5"])
     with pytest.raises(DataError, match="refuse needs features of one recording by itself"):
         train(few_set, refuse=[flooded_set], joined=[f"again={few_set}"])
+
+
+def test_what_a_model_learns_to_grade_it_cannot_learn_to_refuse(few_set, tmp_path):
+    with pytest.raises(DataError, match=r"also in the training set .*, must not be"):
+        train(few_set, refuse=[few_set])
+    ran = CliRunner().invoke(
+        cli, ["train", str(few_set), "--refuse", str(few_set), "-o", str(tmp_path / "m.wsm")]
+    )
+    assert ran.exit_code == 2
+    assert "leave them out" in ran.stderr
 
 
 def test_regimes_that_a_set_draws_are_kinds_of_their_own(few_set, tmp_path):

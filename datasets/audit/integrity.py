@@ -19,6 +19,7 @@ from ...sim.wear.archard import grade
 from ..draws.draws import Range
 from ..file.attributes import signal_checksum
 from ..file.record import DataSet
+from ..measured.labels import MOST_WEAR
 from ..recipe.load import recorded_recipe
 from ..recipe.recipe import Recipe
 from ..split.rules import check_no_leak
@@ -136,6 +137,87 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
     )
 
 
+def refuse_wrong_labels(path: str | Path) -> None:
+    """Refuse labels that no model should learn from, or be judged by.
+
+    Unlike :func:`check_set` it reads the manifest alone, and signals only where two records of
+    different machines have one checksum.
+
+    Parameters
+    ----------
+    path : str or Path
+        A finished file.
+
+    Raises
+    ------
+    DataError
+        If a label is infinite, negative, outside the range of the recipe, far beyond the condemning
+        limit, or contradicted by the grade; or a record is there under two machines; all at once.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from wearstate.datasets.generation.generate import generate
+    >>> from wearstate.datasets.recipe.load import load_recipe
+    >>> recipe = load_recipe("journal-bearing-small", {"duration": "0.05 s"})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     refuse_wrong_labels(generate(recipe, 2, Path(folder) / "data.h5").path)
+    """
+    with DataSet(path) as data:
+        item = _Inspection(data, _unread(len(data)))
+        found = [each for check in _LABEL_CHECKS for each in check(item)]
+        found += [each for each in _check_equal_signals(item) if "across groups" in each.text]
+    faults = [finding for finding in found if finding.severity == "fault"]
+    if faults:
+        raise DataError(
+            "\n".join(
+                f"{path}: {_records_text(each.records, len(each.records))}{each.text}"
+                for each in faults
+            )
+        )
+
+
+def refuse_shared(path: str | Path, others: Sequence[str | Path]) -> None:
+    """Refuse records that are in a training set and among those that its model must refuse.
+
+    Parameters
+    ----------
+    path : str or Path
+        Training set.
+    others : sequence of str or Path
+        Data sets to be refused by the model.
+
+    Raises
+    ------
+    DataError
+        If a signal of any of them is in the training set.
+    """
+    faults = []
+    with DataSet(path) as data:
+        own = data.rows["signal_crc32"]
+        for other in others:
+            with DataSet(other) as strange:
+                checksums = strange.rows["signal_crc32"]
+                twins = [
+                    int(index)
+                    for index in np.flatnonzero(np.isin(checksums, own))
+                    if _is_among(strange.stored_signal(int(index)), data, checksums[index] == own)
+                ]
+            if twins:
+                faults.append(
+                    f"{other}: {_records_text(twins, len(twins))}also in the training set {path}, "
+                    "must not be: a model cannot learn to grade and to refuse the same signal; "
+                    "leave them out"
+                )
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+def _is_among(signal: NDArray[np.float32], data: DataSet, at: Flags) -> bool:
+    """Whether one of the records has this signal: checksums of others may be equal by chance."""
+    return any(np.array_equal(signal, data.stored_signal(i)) for i in np.flatnonzero(at).tolist())
+
+
 # --- data of the checks -------------------------------------------------------------------------
 
 
@@ -181,6 +263,12 @@ def _read_signals(data: DataSet, progress: Callable[[int, int], None] | None) ->
         n_bytes=n_bytes,
         doubts=doubts,
     )
+
+
+def _unread(n: int) -> _Signals:
+    """Signals that are taken to be as they should."""
+    none = np.zeros(n, dtype=bool)
+    return _Signals(damaged=none, infinite=none, zero=none, constant=none, n_bytes=0, doubts={})
 
 
 def _speeds(rows: NDArray[np.void]) -> NDArray[np.float64]:
@@ -380,6 +468,11 @@ def _check_grades(item: _Inspection) -> Iterator[IntegrityFinding]:
     shown = ", ".join(f"{edge:g}" for edge in edges)
     text = f"grade must be what {name} and the limits {shown} m make it; correct the label"
     yield from _fault("grade", text, known & (grades != wanted))
+    text = (
+        f"{name} is more than {MOST_WEAR:g} times the condemning limit, {edges[-1]:g} m; labels "
+        "are in metres: check the unit"
+    )
+    yield from _fault("grade", text, known & (values > MOST_WEAR * edges[-1]))
 
 
 def _check_recipe(item: _Inspection) -> Iterator[IntegrityFinding]:
@@ -519,6 +612,9 @@ _CHECKS: tuple[Callable[[_Inspection], Iterator[IntegrityFinding]], ...] = (
 )
 """All checks; a new one is one function and one row."""
 
+_LABEL_CHECKS = (_check_numbers, _check_grades, _check_recipe)
+"""Checks of the manifest whose faults spoil a model."""
+
 
 # --- text ---------------------------------------------------------------------------------------
 
@@ -582,10 +678,16 @@ def checked_text(table: Mapping[str, Any]) -> str:
 
 
 def _finding_line(finding: Mapping[str, Any]) -> str:
-    where = ""
-    if finding["count"]:
-        more = finding["count"] - _SHOWN
-        shown = ", ".join(map(str, finding["records"][:_SHOWN]))
-        where = f"record{'s' if finding['count'] > 1 else ''} {shown}"
-        where += f" and {more} more: " if more > 0 else ": "
+    where = _records_text(finding["records"], finding["count"])
     return f"{finding['severity']:5}  {finding['check']:9}  {where}{finding['text']}"
+
+
+def _records_text(records: Sequence[int], count: int) -> str:
+    """The first of the records that a finding is about; empty if it is about the file."""
+    if not count:
+        return ""
+    more = count - _SHOWN
+    shown = ", ".join(map(str, records[:_SHOWN]))
+    return (
+        f"record{'s' if count > 1 else ''} {shown}" + (f" and {more} more" if more > 0 else "")
+    ) + ": "

@@ -291,6 +291,10 @@ def _row_numbers(table: "LabelTable", faults: list[str]) -> tuple[int, ...] | No
 
 # --- limits -------------------------------------------------------------------------------------
 
+MOST_WEAR = 20.0
+"""Wear over the condemning limit that no joint reaches. Millimetres taken for metres give 100 or
+more: new bearings have a tenth of their limit."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LabelLimits:

@@ -10,7 +10,7 @@ from ...sim.wear.archard import grade
 from ..file.machines import FILE, GROUP_NAME
 from .label_columns import GRADE, GROUP, ROW, Value
 from .label_table import refusal
-from .labels import LabelLimits, Labels
+from .labels import MOST_WEAR, LabelLimits, Labels
 from .plan import Header
 
 GroupBy = Literal["file", "folder", "column"]
@@ -172,6 +172,7 @@ def _grades(
         )
         return labelled
     column = labels.severities[0]
+    faults.extend(_unit_faults(headers, column, [float(own[column]) for own in given], limits))
     found = [_grade(own[column], limits) for own in given]
     for header, by_limits, by_label in zip(headers, found, labelled, strict=True):
         if by_label >= 0 and by_limits >= 0 and by_label != by_limits:
@@ -180,6 +181,27 @@ def _grades(
                 "limits; correct the label, or leave grade or limits out"
             )
     return [a if a >= 0 else b for a, b in zip(found, labelled, strict=True)]
+
+
+def _unit_faults(
+    headers: Sequence[Header], column: str, values: Sequence[float], limits: LabelLimits
+) -> list[str]:
+    """A sentence on wear far beyond the condemning limit, as of labels in millimetres."""
+    condemning = limits.edges[-1]
+    wrong = [
+        (header.name, value)
+        for header, value in zip(headers, values, strict=True)
+        if value > MOST_WEAR * condemning
+    ]
+    if not wrong:
+        return []
+    first, value = wrong[0]
+    more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+    return [
+        f"{first}{more}: {column} = {value:g} m must be at most {MOST_WEAR:g} times the condemning "
+        f"limit, {condemning:g} m; labels are in metres unless the heading of their column names "
+        f"another unit, as in '{column.removesuffix('_m')} [mm]'"
+    ]
 
 
 def _grade(severity: Value, limits: LabelLimits) -> int:

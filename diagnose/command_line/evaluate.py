@@ -156,6 +156,7 @@ def _judge(
     given: Mapping[str, Any],
 ) -> None:
     """Judge a finished model, or by splits; print text or JSON, and write a file if requested."""
+    from ...datasets.audit.integrity import refuse_wrong_labels
     from ..evaluation.figure import save_evaluation
     from ..evaluation.protocol import evaluate_splits
     from ..evaluation.splits import ALL_SPLITS, case_of
@@ -169,6 +170,7 @@ def _judge(
         ways |= {"seed": seed, "jobs": jobs, "progress": progress}
         if given["retrain"]:
             names = ALL_SPLITS if "all" in given["retrain"] else given["retrain"]
+            refuse_wrong_labels(data)
             case = case_of(model, data, healthy=given["healthy"], **ways)
             result = evaluate_splits(case, names, say=lambda text: click.echo(text, err=True))
             if output is not None:

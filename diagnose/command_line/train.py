@@ -162,6 +162,7 @@ def train(
     view. If the target names conditions instead of a severity: a model that names the condition,
     judged with each recording left out in turn.
     """
+    from ...datasets.audit.integrity import refuse_shared, refuse_wrong_labels
     from ...datasets.file.views import views_of
     from ..class_model.train import names_classes
     from ..evaluation.evaluate import score
@@ -191,6 +192,8 @@ def train(
             )
         _train_classes(data, output, target, choices[0], seed, jobs, force, as_json)
         return
+    refuse_wrong_labels(data)
+    refuse_shared(data, refuse)
     with progress_bar("features") as progress:
         model, table, test = train_model(
             data,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...datasets.audit.integrity import refuse_wrong_labels
 from ...datasets.file.views import views_of
 from ...datasets.file.writer import refuse_output
 from ...sim.output.recording import html_table
@@ -124,7 +125,8 @@ def evaluate(
     Raises
     ------
     DataError
-        If the wear is not labelled, the features differ, or no machine is unseen.
+        If the wear is not labelled, or labels contradict grades, limits or recipe; if the features
+        differ, or no machine is unseen.
     ModelError
         If the model file cannot be used.
 
@@ -135,6 +137,7 @@ def evaluate(
     >>> found, found.text[:12]
     (<Evaluation of diametral_clearance_crankpin_m on pump.h5>, 'Evaluated on')
     """
+    refuse_wrong_labels(data)
     known = model if isinstance(model, WearModel) else load_model(model)
     result = evaluate_model(
         known,

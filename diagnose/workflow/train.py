@@ -4,6 +4,7 @@ from collections.abc import Sequence, Sized
 from dataclasses import replace
 from pathlib import Path
 
+from ...datasets.audit.integrity import refuse_shared, refuse_wrong_labels
 from ...datasets.file.views import views_of
 from ...sim.output.recording import DataError
 from ..class_model.train import ClassModel
@@ -72,8 +73,9 @@ def train(
     ------
     DataError
         If there is no such column or split, there are no limits, too few machine draws, machines
-        unknown or without a healthy record, a budget that no model meets, or recordings to refuse
-        that have other channels or cannot be distinguished from the rest.
+        unknown or without a healthy record, a budget that no model meets, labels that contradict
+        grades, limits or recipe, a record under two machines, or recordings to refuse that are in
+        the data set, have other channels or cannot be distinguished from the rest.
 
     Examples
     --------
@@ -83,6 +85,8 @@ def train(
     ('diametral_clearance_crankpin_m', 'cold', 18)
     """
     _refuse_recordings(data)
+    refuse_wrong_labels(data)
+    refuse_shared(data, refuse)
     views = views_of(joined)
     model, _, _ = train_model(
         data,
