@@ -35,7 +35,7 @@ from wearstate.diagnose.evaluation.splits import (
     noisy_table,
     with_noise,
 )
-from wearstate.diagnose.evaluation.text import score_lines, splits_text
+from wearstate.diagnose.evaluation.text import baseline_lines, score_lines, splits_text
 from wearstate.diagnose.learning.scores import resampled
 from wearstate.diagnose.wear_model import train as training
 from wearstate.diagnose.wear_model.file import load_model, save_model
@@ -484,6 +484,21 @@ def test_text_of_a_set_without_a_familiar_record(result, trained):
     nothing = {**split_named(result, "random"), "mae_m": None}
     assert "none is familiar" in score_lines(nothing, trained[0].card)[-1]
     assert score_lines({}, trained[0].card) == ["not evaluated: no machine draw was held out"]
+
+
+def test_baselines_are_told_over_all_records_as_on_the_page():
+    figures = {
+        "missing": "",
+        "flattered": False,
+        "accuracy": {"value": 0.5},
+        "mae_share_of_limit": {"value": 0.1},
+        "mae_all_share_of_limit": {"value": 0.2},
+        "difference": {"value": -0.01, "low": -0.02, "high": 0.0},
+        "difference_all": {"value": -0.05, "low": -0.06, "high": -0.04},
+    }
+    _, line, note = baseline_lines({"single_rms": figures})
+    assert line.split() == ["single", "rms", "20.0", "0.500", "-5.0", "[-6.0,", "-4.0]"]
+    assert note == "  error and difference over all records, accuracy over those not unfamiliar"
 
 
 def test_the_page_stands_alone(result):

@@ -140,7 +140,7 @@ def _bracketed(
 
 
 def baseline_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Comparison with baselines, as lines for a terminal.
+    """Comparison with baselines over all records, also refused ones, as lines for a terminal.
 
     Parameters
     ----------
@@ -154,20 +154,23 @@ def baseline_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
       tsfel         not here
     """
     head = f"  {'baseline':12}  error [% of limit]  accuracy  difference [% of limit]"
-    return [head, *(_baseline_line(name, row) for name, row in rows.items())]
+    lines = [head, *(_baseline_line(name, row) for name, row in rows.items())]
+    if all(row["missing"] for row in rows.values()):
+        return lines
+    return [*lines, "  error and difference over all records, accuracy over those not unfamiliar"]
 
 
 def _baseline_line(name: str, row: Mapping[str, Any]) -> str:
     line = f"  {name.replace('_', ' '):12}  "
     if row["missing"]:
         return line + str(row["missing"])
-    value = row["mae_share_of_limit"]["value"]
-    if value is None:
+    value, accuracy = row["mae_all_share_of_limit"]["value"], row["accuracy"]["value"]
+    if accuracy is None:
         return line + "none: no record was graded"
-    apart = row["difference"]
+    apart = row["difference_all"]
     note = "  (trained on the evaluated data set)" if row["flattered"] else ""
     return (
-        f"{line}{100 * value:18.1f}  {row['accuracy']['value']:8.3f}  "
+        f"{line}{100 * value:18.1f}  {accuracy:8.3f}  "
         f"{_bracketed(apart['value'], apart['low'], apart['high'], 100.0, 1)}{note}"
     )
 
