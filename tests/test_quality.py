@@ -15,6 +15,7 @@ from wearstate.diagnose.recording_faults.samples import sample_faults
 from wearstate.diagnose.recording_faults.suspicions import Observation, suspicions
 from wearstate.diagnose.wear_model.cautions import condition_cautions
 from wearstate.diagnose.wear_model.file import load_model
+from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel, mains_hum
 
@@ -154,6 +155,15 @@ def test_what_stands_still_by_itself_has_lost_nothing():
     assert not any(fault.kind == "gap" for fault in sample_faults(hammer))
     square = np.sign(np.sin(2 * np.pi * 2 * np.arange(5000) / 1000 + 0.1))
     assert not any(fault.kind == "gap" for fault in sample_faults(acceleration(square[None])))
+
+
+def test_one_sensor_in_two_channels_is_named():
+    wave = np.random.default_rng(0).standard_normal(3000)
+    [fault] = sample_faults(acceleration(np.array([wave, wave])))
+    assert (fault.kind, fault.channel, fault.bars) == ("layout", "acc_0, acc_1", True)
+    assert "hold the same samples" in fault.text
+    dead = sample_faults(acceleration(np.zeros((2, 3000))))
+    assert {fault.kind for fault in dead} == {"dead"}
 
 
 def test_all_faults_are_named_at_once():
@@ -338,6 +348,49 @@ def test_a_suspicion_is_named_only_where_mending_helps(two_tones):
     assert suspicions(two_tones, a_look(distance=2.5), sees(lambda _: False), (4.0, 6.0)) == ()
     # nothing is tried on what is familiar
     assert suspicions(two_tones, a_look(), sees(swapped_back), (4.0, 6.0)) == ()
+
+
+def test_swapped_channels_are_tried_on_what_is_hardly_familiar(two_tones):
+    first = two_tones.signal[0]
+
+    def nearer(distance):
+        def look(recording):
+            swapped_back = np.array_equal(recording.signal[1], first)
+            return a_look(distance=distance if swapped_back else 1.3)
+
+        return look
+
+    [fault] = suspicions(two_tones, a_look(distance=1.3), nearer(0.8), (4.0, 6.0))
+    assert fault.kind == "swapped"
+    assert suspicions(two_tones, a_look(distance=1.3), nearer(1.1), (4.0, 6.0)) == ()
+    assert suspicions(two_tones, a_look(distance=1.0), nearer(0.5), (4.0, 6.0)) == ()
+
+
+def test_more_pulses_than_stated_are_named_with_their_number(two_tones):
+    tacho = 5.0 * (np.arange(4000) % 100 < 10)  # 10 Hz
+    key = Channel(name="key", unit="V", quantity="tacho")
+    recording = replace(
+        two_tones,
+        signal=np.vstack([two_tones.signal, tacho]),
+        channels=(*two_tones.channels, key),
+        tacho="key",
+    )
+
+    def look(mended):
+        pulses = pulse_times(mended.tacho_signal, mended.sample_rate)
+        late = pulses[0] > 0.15  # of the two, the second is at the dead centre
+        return a_look(distance=0.9 if late else 1.3, speed=1 / np.diff(pulses).mean())
+
+    fast = a_look(distance=1.2, speed=10.0)
+    [fault] = suspicions(recording, fast, look, (4.0, 6.0))
+    assert fault.kind == "tacho"
+    assert "10 Hz, 2 times the speed at which the recording is familiar" in fault.text
+    # of another speed, stated already, or not much more familiar
+    assert suspicions(recording, fast, look, (7.0, 8.0)) == ()
+    stated = replace(recording, pulses_per_revolution=2)
+    assert "tacho" not in {fault.kind for fault in suspicions(stated, fast, look, (4.0, 6.0))}
+    hardly = suspicions(recording, fast, lambda _: a_look(distance=1.2), (4.0, 6.0))
+    assert "tacho" not in {fault.kind for fault in hardly}
 
 
 def test_a_rate_is_suspected_where_it_brings_the_speed_into_range(two_tones):

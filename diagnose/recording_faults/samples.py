@@ -1,4 +1,6 @@
-"""Faults visible in the samples alone: saturation, lost samples, dead channels, missing pulses."""
+"""Faults visible in the samples alone: saturation, gaps, dead or equal channels, missing pulses."""
+
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +31,7 @@ _NEVER_STILL = ("acceleration", "velocity", "displacement")
 
 
 def sample_faults(recording: Recording) -> tuple[QualityFault, ...]:
-    """Find flat tops, gaps, dead channels and a tacho that gives no pulses.
+    """Find flat tops, gaps, dead channels, equal ones, and a tacho that gives no pulses.
 
     Parameters
     ----------
@@ -62,7 +64,22 @@ def sample_faults(recording: Recording) -> tuple[QualityFault, ...]:
     faults: list[QualityFault] = []
     for channel, row in zip(recording.vibration_channels, recording.vibration, strict=True):
         faults += _channel_sample_faults(channel, row, recording.sample_rate)
-    return (*faults, *_tacho_faults(recording))
+    return (*faults, *_twin_faults(recording), *_tacho_faults(recording))
+
+
+def _twin_faults(recording: Recording) -> list[QualityFault]:
+    """Channels of one quantity that hold the same samples: one cable, or one column read twice."""
+    both = combinations(zip(recording.vibration_channels, recording.vibration, strict=True), 2)
+    return [
+        QualityFault(
+            kind="layout",
+            channel=f"{a.name}, {b.name}",
+            text=f"channels {a.name} and {b.name} hold the same samples, must be of two sensors; "
+            "check cables and channels",
+        )
+        for (a, one), (b, other) in both
+        if a.quantity == b.quantity and np.ptp(one) > 0 and np.array_equal(one, other)
+    ]
 
 
 def _channel_sample_faults(

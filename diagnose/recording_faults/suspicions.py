@@ -1,4 +1,4 @@
-"""Wrong units, swapped channels and wrong sample rates, each tried on the recording.
+"""Wrong units, swapped channels, wrong sample rates and tacho pulses, each tried on the recording.
 
 The recording is corrected as suspected, and must then look familiar to the model.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...datasets.file.views import MARK
+from ...features.rotation.order import pulse_times
 from ...sim.output.recording import Recording
 from ..feature_rows.resampling import resampled
 from .fault import QualityFault
@@ -28,6 +29,17 @@ _TRIED = 2  # factors of units
 _NEARER = (
     0.5  # of the excess: one of 11 dB is no factor of 20 dB, though 9 dB the other way is less
 )
+
+_DOUBTFUL = 0.75
+"""Share of the limit of familiarity from which swapped channels are tried, and up to which pulses
+explain a speed: of 20 pumps as they are none was beyond 0.73; swapped all were, and with a wrong
+rate and half of the pulses those of a small model were beyond 1.05."""
+
+_SWAPPED_NEARER = 0.8  # of the distance: swapped back, those pumps were at 0.4 to 0.75 of it
+
+PULSES = (2, 3, 4, 6, 8)  # per revolution, where one is stated
+_FEWEST_KEPT = 3
+_PULSE_WIDTH = 0.1  # of a revolution
 
 _FREE = 0.75  # of the limit: features independent of the rate stay within half of it
 _OFF_DB = 10.0  # half-way to a factor of 9.81 [dB]
@@ -96,16 +108,20 @@ def suspicions(
     -------
     tuple of QualityFault
         The first explanation that makes the recording familiar, in the order unit (if a level is
-        off), channels (if the shape is unfamiliar), rate (if shape or speed is); empty if none
-        does, or if the recording is familiar as it is.
+        off), channels (if the shape is hardly familiar), pulses of the tacho (if the speed is
+        strange), rate (if shape or speed is); empty if none does, or if the recording is familiar
+        as it is.
     """
     paced = speeds is None or look.speed_hz is None or _within(look.speed_hz, speeds)
     near = look.distance < look.limit
     found: tuple[QualityFault, ...] = ()
     if not look.level:
         found = _wrong_unit(recording, look, see)
-    if not found and not near and paced:  # swapped cables do not change the speed
-        found = _swapped(recording, see)
+    doubtful = look.distance >= _DOUBTFUL * look.limit
+    if not found and doubtful and paced:  # swapped cables do not change the speed
+        found = _swapped(recording, look, see)
+    if not found and not paced and speeds is not None:
+        found = _wrong_pulses(recording, look, see, speeds)
     if not found and not (near and paced) and speeds is not None:
         rate = recording.sample_rate if stated is None else stated
         found = _wrong_rate(recording, look, see, speeds, rate)
@@ -159,7 +175,7 @@ def _times(factor: float) -> str:
     return f"multiplied by {factor:.4g}" if factor > 1 else f"divided by {1 / factor:.4g}"
 
 
-def _swapped(recording: Recording, see: Observe) -> tuple[QualityFault, ...]:
+def _swapped(recording: Recording, look: Observation, see: Observe) -> tuple[QualityFault, ...]:
     channels = [c for c in recording.channels if c.name != recording.tacho]
     for a, b in combinations(channels, 2):
         if a.quantity != b.quantity or a.unit != b.unit:
@@ -168,7 +184,7 @@ def _swapped(recording: Recording, see: Observe) -> tuple[QualityFault, ...]:
         order = np.arange(len(recording.names))
         order[[first, second]] = second, first
         mended = see(replace(recording, signal=recording.signal[order]))
-        if mended.familiar:
+        if mended.familiar and mended.distance < _SWAPPED_NEARER * look.distance:
             text = f"channels {a.name} and {b.name} look swapped; swap their cables or names"
             return (QualityFault(kind="swapped", channel=f"{a.name}, {b.name}", text=text),)
     return ()
@@ -197,3 +213,38 @@ def _wrong_rate(
             )
             return (QualityFault(kind="rate", channel="", text=text, factor=ratio),)
     return ()
+
+
+def _wrong_pulses(
+    recording: Recording, look: Observation, see: Observe, speeds: tuple[float, float]
+) -> tuple[QualityFault, ...]:
+    """More pulses per revolution than stated: keep every second, third, … one on trial."""
+    if look.speed_hz is None or recording.tacho is None or recording.pulses_per_revolution != 1:
+        return ()
+    tacho = recording.signal[recording.names.index(recording.tacho)]
+    pulses = pulse_times(tacho, recording.sample_rate)
+    for count in PULSES:
+        if not _within(look.speed_hz / count, speeds) or len(pulses) < _FEWEST_KEPT * count:
+            continue
+        looks = [see(_thinned(recording, pulses[first::count])) for first in range(count)]
+        if any(each.level and each.distance < _DOUBTFUL * each.limit for each in looks):
+            text = (
+                f"tacho {recording.tacho} shows {look.speed_hz:.4g} Hz, {count} times the speed at "
+                f"which the recording is familiar: it gives {count} pulses per revolution, the "
+                "model needs 1; keep the pulse at the top dead centre"
+            )
+            return (QualityFault(kind="tacho", channel=recording.tacho, text=text),)
+    return ()
+
+
+def _thinned(recording: Recording, pulses: Float) -> Recording:
+    """The recording with these pulses of its tacho alone, at times [s]."""
+    place = recording.names.index(str(recording.tacho))
+    tacho = recording.signal[place]
+    clean = np.full(tacho.size, tacho.min())
+    width = max(1, round(_PULSE_WIDTH * float(np.diff(pulses).min()) * recording.sample_rate))
+    for start in np.ceil(pulses * recording.sample_rate).astype(int).tolist():
+        clean[start : start + width] = tacho.max()
+    signal = recording.signal.copy()
+    signal[place] = clean
+    return replace(recording, signal=signal)
