@@ -206,6 +206,7 @@ def test_plain_words_are_no_options():
         assert as_options(text, command) == text
     assert as_options("use force to replace it", command) == "use --force to replace it"
     assert as_options("a: fs = 1 Hz must be", command) == "a: --fs = 1 Hz must be"
+    assert as_options("give fs = 100 if that is in Hz", command) == "give --fs 100 if that is in Hz"
     assert as_options("use force", None) == "use force"
 
 
@@ -213,7 +214,7 @@ def test_every_option_of_a_row_is_named_as_one():
     command = cli.commands["import"]
     for text, told in (
         ("give delimiter, decimal and header, or", "give --delimiter, --decimal and --header, or"),
-        ("give time_column = 0 and fs if it", "give --time-column = 0 and --fs if it"),
+        ("give time_column = 0 and fs if it", "give --time-column 0 and --fs if it"),
         ("none; name it with tacho", "none; name it with --tacho"),
         ("give it, or header and unit", "give it, or header and unit"),
     ):

@@ -154,7 +154,7 @@ def test_a_split_of_the_file_is_judged_by_its_records(case):
 
 
 def test_an_unknown_split_is_refused(case):
-    with pytest.raises(DataError, match=r"split = 'sped' must be one of random, speed"):
+    with pytest.raises(DataError, match=r"held-out part 'sped' must be one of random, speed"):
         evaluate_splits(case, ["sped"])
 
 

@@ -107,7 +107,7 @@ def channels_of_source(source: Source, tacho: str | None) -> tuple[Channel, ...]
     if tacho is not None and tacho not in names:
         faults.append(f"has no channel {tacho!r} to be the tacho{nearest(tacho, names)}")
     if faults:
-        raise DataError("\n".join(f"{source.path}: {fault}" for fault in faults))
+        raise DataError("\n".join(f"{source.path}: {fault}" for fault in _gathered(faults)))
     return tuple(
         Channel(
             name=channel.name,
@@ -117,6 +117,33 @@ def channels_of_source(source: Source, tacho: str | None) -> tuple[Channel, ...]
         )
         for channel in source.channels
     )
+
+
+_MOST_LINES = 8  # of one fault; a table of features has a thousand columns
+_NAMED = 3  # of the channels of more
+
+
+def _gathered(faults: Sequence[str]) -> list[str]:
+    """Faults, those of many channels in one.
+
+    Examples
+    --------
+    >>> _gathered(["fs must be given", *(f"channel '{name}': unit must be given" for name in "ab")])
+    ['fs must be given', "channel 'a': unit must be given", "channel 'b': unit must be given"]
+    >>> _gathered([f"channel '{name}': unit must be given" for name in "abcdefghijkl"])
+    ["channels 'a', 'b', 'c' and 9 more: unit must be given"]
+    """
+    channels: dict[str, list[str]] = {}
+    for fault in faults:
+        name, _, text = fault.removeprefix("channel ").partition(": ")
+        if fault.startswith("channel '"):
+            channels.setdefault(text, []).append(name)
+    many = {text: names for text, names in channels.items() if len(names) > _MOST_LINES}
+    kept = [fault for fault in faults if fault.partition(": ")[2] not in many]
+    return kept + [
+        f"channels {', '.join(names[:_NAMED])} and {len(names) - _NAMED} more: {text}"
+        for text, names in many.items()
+    ]
 
 
 # --- files --------------------------------------------------------------------------------------

@@ -73,7 +73,7 @@ def evaluate_splits(
     known = (*ALL_SPLITS, *case.stored)
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise DataError(f"split = {unknown[0]!r} must be one of {', '.join(known)}, or all")
+        raise DataError(f"held-out part {unknown[0]!r} must be one of {', '.join(known)}, or all")
     report = say or (lambda _text: None)
     splits: list[dict[str, Any]] = []
     for name in names:

@@ -190,7 +190,8 @@ def as_options(text: str, command: click.Command | None) -> str:
         word = option.removeprefix("--").replace("-", "_")
         for name in {word, param.name, *_OTHER_NAMES.get(option, ())} if option else ():
             text = _with_option(text, str(name), option)
-    return text
+    # an option to be given is written as it is typed
+    return re.sub(r"\b(give|with|use) (--[\w-]+) = ", r"\1 \2 ", text)
 
 
 _OTHER_NAMES = {"--speed-band": ("band_hz",)}
