@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.nameplate.cautions import recording_context, untrained_wear
 from wearstate.diagnose.recording_faults.layout import layout_faults
 from wearstate.diagnose.recording_faults.levels import Levels, fit_levels, quiet_faults
 from wearstate.diagnose.recording_faults.samples import sample_faults
@@ -487,3 +488,12 @@ def test_what_is_thirty_times_too_quiet_is_dead():
         found = quiet_faults(recording, names, row, levels)
         assert [fault.kind for fault in found] == kinds
     assert isinstance(levels, Levels)
+
+
+def test_a_model_that_never_saw_a_condemned_machine_says_so(model, familiar):
+    assert untrained_wear(model.card) == ()  # trained beyond the limit
+    low = model.card.severity_range_m[0]
+    card = model.card.model_copy(update={"severity_range_m": (low, 0.13e-3)})
+    [text] = untrained_wear(card)
+    assert text.startswith("no machine in training was worn beyond 0.13 mm, the condemning limit")
+    assert recording_context(None, familiar[0], card)["told"] == (text,)

@@ -171,6 +171,7 @@ def train(
     from ..feature_rows.noted import partly_noted
     from ..healthy_reference.healthy import references
     from ..healthy_reference.transfer_reference import healthy_transfer
+    from ..nameplate.cautions import untrained_wear
     from ..wear_model.file import save_model
     from ..wear_model.train import train_model
 
@@ -234,6 +235,7 @@ def train(
     ]
     if model.notice:
         lines.append(f"Notice: {model.notice}.")
+    lines += [f"Caution: {text}." for text in untrained_wear(model.card)]
     chosen = {**model.card.feature_choice.table(), "ms_per_record": costs}
     value = {
         "path": str(output),

@@ -48,8 +48,34 @@ def recording_context(
     cautions = () if known else nameplate_cautions(plate, recording.row, card)
     return {
         "conditions": day_of(plate, recording.row),
-        "told": (*cautions, *_gap_cautions(plate, recording, baseline, card.trained_on.scene)),
+        "told": (
+            *untrained_wear(card),
+            *cautions,
+            *_gap_cautions(plate, recording, baseline, card.trained_on.scene),
+        ),
     }
+
+
+def untrained_wear(card: ModelCard) -> tuple[str, ...]:
+    """Caution of a model that never learnt how a condemned machine sounds.
+
+    Parameters
+    ----------
+    card : ModelCard
+
+    Returns
+    -------
+    tuple of str
+        Empty if training reached the condemning limit.
+    """
+    worst, limit = card.severity_range_m[1], card.condemning_limit_m
+    if worst >= limit:
+        return ()
+    return (
+        f"no machine in training was worn beyond {1e3 * worst:.3g} mm, the condemning limit is "
+        f"{1e3 * limit:.3g} mm: a condemned one may be graded as less worn; train on machines up "
+        "to the limit",
+    )
 
 
 def _gap_cautions(
