@@ -927,8 +927,8 @@ def test_a_short_life_hastens_the_advice(model, tmp_path):
     # (300 - 260) µm at 2 µm an hour; the estimates err by up to 8 %, 20 µm, 10 h
     assert outlook.remaining_h == pytest.approx(20, abs=10)
     assert outlook.remaining_low_h < outlook.remaining_h < outlook.remaining_high_h
-    assert now.horizon.startswith("within")
-    assert "can be reached before" in now.advice
+    assert now.advice.horizon.startswith("within")
+    assert "can be reached before" in now.advice.sentence
 
 
 def test_machines_of_a_data_set_are_told_apart(model, tmp_path):
