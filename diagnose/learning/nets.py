@@ -140,7 +140,7 @@ def _importances(deviation: Float, level: Float, seed: int) -> Float:
         _TREES, min_samples_leaf=_LEAF, max_features=_TRIED, random_state=seed
     ).fit(deviation[records], level[records])
     # a sum over all splits, which rounding may leave just below zero
-    return np.maximum(forest.feature_importances_, 0.0)
+    return np.asarray(np.maximum(forest.feature_importances_, 0.0))
 
 
 def _directions(deviation: Float, importance: Float, noted: int) -> Float:
