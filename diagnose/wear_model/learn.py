@@ -1,5 +1,6 @@
 """Fit everything that a wear model holds, by folds of whole machines."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -44,7 +45,8 @@ from .training_rows import FOLDS, TrainingRows
 Float = NDArray[np.float64]
 
 _FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
-_WORTH = 0.1  # of the error: conditions that bring less are not worth asking for
+_WORTH = 0.05  # of the error: conditions that bring less are not worth asking for
+_CERTAIN = 2.0  # standard errors that their gain must exceed
 
 SeverityFit = Fitted[Blend] | Fitted[Experts]
 
@@ -284,14 +286,24 @@ def _informed(
 
 
 def _worth_asking(training: TrainingRows, informed: Float, blind: Float) -> bool:
-    """Whether conditions lower the mean error by a tenth, of all records or of those of a regime.
+    """Whether conditions lower the mean error noticeably, of all records or of those of a regime.
 
     A pin that floats in oil errs three times as much as a dry one, and hides what a dry one gains.
     """
     regimes = [here for name, here in training.faults.items() if is_regime(name)]
     parts = [np.ones(len(blind), dtype=bool), *(r for r in regimes if r.sum() >= FEWEST_RECORDS)]
     before, after = (np.abs(each - training.severity) for each in (blind, informed))
-    return any(after[part].mean() <= (1 - _WORTH) * before[part].mean() for part in parts)
+    return any(
+        _noticeable((before - after)[part], before[part], training.groups[part]) for part in parts
+    )
+
+
+def _noticeable(gain: Float, error: Float, groups: NDArray[np.intp]) -> bool:
+    """Whether a gain is a part of the error that counts, and not by chance over machines."""
+    _, place = np.unique(groups, return_inverse=True)
+    machine = np.bincount(place, gain) / len(gain)  # parts of the mean gain
+    uncertain = machine.std() * math.sqrt(len(machine))
+    return bool(gain.mean() >= max(_WORTH * error.mean(), _CERTAIN * uncertain))
 
 
 def _fits_of_others(
