@@ -206,6 +206,9 @@ features on one core of 2.5 GHz."""
 WITNESSES = tuple(candidate.name for candidate in CANDIDATES[:_LINES])
 """Names of the straight lines of the logarithm."""
 
+SMOOTH = (*WITNESSES, "nets")
+"""Names of what distinguishes kinds of recordings by hundreds of features together."""
+
 BUDGET_MS = 5.0
 """Time that a prediction may take by default [ms]."""
 

@@ -25,12 +25,13 @@ from ..feature_rows.feature_table import (
 )
 from ..feature_rows.model_card import StrangerRates
 from ..learning.heads import Head, fit_head, told_apart
-from ..learning.regressions import CANDIDATES, WITNESSES
+from ..learning.regressions import CANDIDATES, SMOOTH
 from .training_rows import FOLDS, Strangers, TrainingRows
 
-REFUSED_AS_STRANGER = 0.005
+REFUSED_AS_STRANGER = 0.01
 """Share of familiar recordings, left out of the fit, that may be taken for any of the strangers."""
 
+_FAMILIAR = 4000  # recordings that a classifier learns: enough for the one in 300 it may mistake
 _FEWEST = 20  # of a kind, for a rate to within a tenth
 _LEAST_DETECTED = 0.5  # of a kind: if fewer are recognised, it is not another kind
 
@@ -188,15 +189,16 @@ def fit_strangers(training: TrainingRows, seed: int) -> tuple[tuple[Head, Strang
 def _fit(
     training: TrainingRows, strangers: Strangers, share: float, seed: int
 ) -> tuple[Head, StrangerRates]:
-    both = training.with_strangers(strangers)
-    here = np.arange(len(both.rows)) >= len(training.rows)
+    familiar = training.some(_FAMILIAR, seed)
+    both = familiar.with_strangers(strangers)
+    here = np.arange(len(both.rows)) >= len(familiar.rows)
     fitted = fit_head(
         strangers.name,
         both.rows,
         here,
         group_folds(both.groups, n=FOLDS, seed=seed),
         seed=seed,
-        candidates=[each for each in CANDIDATES if each.name in WITNESSES],
+        candidates=[each for each in CANDIDATES if each.name in SMOOTH],
         shifted=both.moved(seed).rows,
     )
     head = told_apart(fitted, here, share)

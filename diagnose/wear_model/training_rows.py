@@ -109,6 +109,22 @@ class TrainingRows:
             strangers=tuple(replace(each, rows=each.rows[:, columns]) for each in self.strangers),
         )
 
+    def some(self, count: int, seed: int) -> "TrainingRows":
+        """Rows of machines drawn at random, some `count` of them if there are more."""
+        if len(self.rows) <= count:
+            return self
+        machine = np.unique(self.groups)
+        share = count / len(self.rows)
+        drawn = np.random.default_rng(seed).permutation(machine)[: round(share * len(machine))]
+        here = np.isin(self.groups, drawn)
+        return TrainingRows(
+            names=self.names,
+            rows=self.rows[here],
+            baseline=None,
+            severity=self.severity[here],
+            groups=self.groups[here],
+        )
+
     def with_strangers(self, strangers: Strangers) -> "TrainingRows":
         """These records, and after them strangers of other machines, as rows alone."""
         first = int(self.groups.max()) + 1
