@@ -97,7 +97,7 @@ def test_machines_of_another_recipe_keep_their_options():
     for machine in range(6):
         one, other = worn[2 * machine], new[3 * machine]
         columns = [name for name in one.row if name.startswith("choice_")]
-        assert len(columns) == 7
+        assert len(columns) == 8
         assert {name: one.row[name] for name in columns} == {n: other.row[n] for n in columns}
         assert one.scene.casing == other.scene.casing
         assert one.scene.joint.wristpin == other.scene.joint.wristpin

@@ -335,19 +335,21 @@ def test_a_channel_too_many_is_left_out_as_the_verdict_says(model_file, tmp_path
 
 def test_what_the_other_model_was_trained_on_is_no_longer_unseen(model):
     """Only if it gives an estimate."""
-    trained = {"scene": "bilge-pump", "recipe": "bilge-pump-standard"}
+    trained = {"scene": "bilge-pump", "recipe": "bilge-pump-narrow"}
     card = model.card.model_copy(
         update={"trained_on": model.card.trained_on.model_copy(update=trained)}
     )
     blind = dataclasses.replace(model, card=card)
-    other = ModelOpinion(trained_on="bilge-pump-oval", severity=2.6e-4, low=2e-4, high=3e-4)
+    other = ModelOpinion(trained_on="bilge-pump-standard", severity=2.6e-4, low=2e-4, high=3e-4)
 
     def unseen(other):
         return " ".join(report_table(recording_of(2.5e-4), blind, graded(), other=other)["unseen"])
 
-    assert "--also" in unseen(None)
-    assert "--also" in unseen(dataclasses.replace(other, severity=None, low=None, high=None))
-    assert "--also" not in unseen(other)
+    assert "across the rod" in unseen(None)
+    assert "across the rod" in unseen(
+        dataclasses.replace(other, severity=None, low=None, high=None)
+    )
+    assert "across the rod" not in unseen(other)
     assert "main bearings" in unseen(other)
 
 

@@ -64,8 +64,8 @@ _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: o
     "--also",
     type=PATH,
     metavar="MODEL",
-    help="Second wear model, of other assumptions (bilge-pump-oval): shown next to this one; where "
-    "they disagree, the larger estimate counts.",
+    help="Second wear model, of other assumptions (bilge-pump-oiled): shown next to this one; "
+    "where they disagree, the larger estimate counts.",
 )
 @click.option(
     "--trend", is_flag=True, help="For many recordings: wear over time and remaining life."

@@ -222,7 +222,7 @@ _UNSEEN = (  # measured: docs/decisions/029-oval-eye.md and 031-loose-main-beari
         severity="diametral_clearance_crankpin",
         text="a crank-pin eye that has worn on its loaded side only is read as wide as it is "
         "across the rod, a third of the limit too low; measure its clearance along the rod, or "
-        "give a second model, trained on bilge-pump-oval (report --also)",
+        "use a model of bilge-pump-standard, which has learnt such eyes",
     ),
     Unseen(
         path="crank.bearing.diametral_clearance",

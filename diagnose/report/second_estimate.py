@@ -146,9 +146,9 @@ def with_other_model(estimate: Estimate, other: ModelOpinion | None) -> Estimate
     Examples
     --------
     >>> trained = Estimate(verdict="graded", grade=1, severity=1.9e-4, low=1.7e-4, high=2.2e-4)
-    >>> other = ModelOpinion(trained_on="bilge-pump-oval", severity=2.9e-4, low=2e-4, high=4e-4)
+    >>> other = ModelOpinion(trained_on="bilge-pump-oiled", severity=2.9e-4, low=2e-4, high=4e-4)
     >>> with_other_model(trained, other).cautions[0][:61]
-    'the model of bilge-pump-oval estimates 0.290 mm (0.200 to 0.4'
+    'the model of bilge-pump-oiled estimates 0.290 mm (0.200 to 0.4'
     """
     if other is None or _holds(estimate, other):
         return estimate
@@ -207,7 +207,7 @@ def relied_on_grade(estimate: Estimate, other: ModelOpinion | None) -> int | Non
     Examples
     --------
     >>> trained = Estimate(verdict="graded", grade=1, severity=1.9e-4, low=1.7e-4, high=2.2e-4)
-    >>> other = ModelOpinion(trained_on="oval eyes", severity=2.9e-4, grade=2)
+    >>> other = ModelOpinion(trained_on="oiled pins", severity=2.9e-4, grade=2)
     >>> relied_on_grade(trained, other)
     2
     """
