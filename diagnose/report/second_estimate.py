@@ -148,7 +148,7 @@ def with_other_model(estimate: Estimate, other: ModelOpinion | None) -> Estimate
     >>> trained = Estimate(verdict="graded", grade=1, severity=1.9e-4, low=1.7e-4, high=2.2e-4)
     >>> other = ModelOpinion(trained_on="bilge-pump-oiled", severity=2.9e-4, low=2e-4, high=4e-4)
     >>> with_other_model(trained, other).cautions[0][:61]
-    'the model of bilge-pump-oiled estimates 0.290 mm (0.200 to 0.4'
+    'the model of bilge-pump-oiled estimates 0.290 mm (0.200 to 0.'
     """
     if other is None or _holds(estimate, other):
         return estimate
