@@ -36,6 +36,7 @@ CARD = SimpleNamespace(
     trained_on=SimpleNamespace(recipe="bilge-pump-narrow", scene="bilge-pump"),
     severity="diametral_clearance_crankpin_m",
     condemning_limit_m=LIMIT,
+    severity_range_m=(0.2 * LIMIT, 1.5 * LIMIT),
     sample_rate_hz=25600.0,
     channels=channels_of(PUMP.scene),
 )
