@@ -333,7 +333,12 @@ def test_nothing_known_is_no_nameplate(tmp_path):
 def card_of(scene, recipe="", conditions=()):
     """What these cautions read of a card."""
     trained = TrainedOn.model_construct(scene=scene, recipe=recipe)
-    return ModelCard.model_construct(trained_on=trained, conditions=list(conditions))
+    return ModelCard.model_construct(
+        trained_on=trained,
+        conditions=list(conditions),
+        severity_range_m=(1e-4, 3.6e-4),
+        condemning_limit_m=2.4e-4,
+    )
 
 
 SPEED = {"name": "shaft.speed_hz", "feature": "shaft.speed_hz", "unit": "Hz"}
@@ -508,13 +513,14 @@ def test_what_misleads_without_a_warning_is_said_unless_the_recipe_draws_it():
         return unseen_texts(card)
 
     crankpin = "diametral_clearance_crankpin_m"
-    eye, play = said("bilge-pump", "bilge-pump-standard", crankpin)
+    eye, play = said("bilge-pump", "bilge-pump-narrow", crankpin)
     assert "along the rod" in eye
     assert "main bearings" in play
+    assert said("bilge-pump", "bilge-pump-standard", crankpin) == [play]  # it draws oval eyes
     loose = StrangerRates(
         name="bilge-pump-loose", records=500, detection_rate=1.0, false_alarm_rate=0.0
     )
-    shown = card_of("bilge-pump", "bilge-pump-standard")
+    shown = card_of("bilge-pump", "bilge-pump-narrow")
     shown = shown.model_copy(update={"severity": crankpin, "strangers": [loose]})
     assert unseen_texts(shown) == [eye]  # it refuses play in the main bearings
     assert said("bilge-pump", "of one's own", crankpin) == []  # nobody knows what it draws

@@ -215,7 +215,7 @@ def test_a_recording_of_something_else_is_unfamiliar(trained, small_set, kind):
     n = whole.signal.shape[1]
     strange = {
         "noise": 10 * rng.standard_normal((2, n)),
-        "tone": np.tile(20 * np.sin(2 * np.pi * 997 * np.arange(n) / 25600), (2, 1)),
+        "tone": 20 * np.sin(2 * np.pi * 997 * np.arange(n) / 25600 + np.array([[0.0], [1.5]])),
     }[kind]
     estimate = model.estimate(changed(whole, signal=np.vstack([strange, whole.signal[2:]])))
     assert estimate.verdict == "unfamiliar"
